@@ -1,0 +1,8 @@
+//! The parts of the width controller. They keep no clock: time comes with
+//! each call.
+
+pub mod event;
+pub mod step;
+
+pub use event::{Event, RobotLimits, RobotMode, RobotState};
+pub use step::{Command, Fault, Hold, Limit, State, Step, Trace};

@@ -1,0 +1,72 @@
+//! What the controller is plugged into. Every trait has at least a live and a
+//! simulated side.
+
+use crate::control::{Command, Event, Step};
+use crate::frame::Frame;
+use crate::time::Stamp;
+
+/// Gives frames, one after the other.
+pub trait FrameSource: Send {
+    /// Waits for the next frame. `Ok(None)` is the orderly end of the source.
+    /// A frame that is there but cannot be decoded is [`Grab::Unreadable`],
+    /// not an error; an error means that no further frame will come.
+    fn next_frame(&mut self) -> Result<Option<Grab>, SourceError>;
+
+    /// How many frames there will be, where that is known.
+    fn expected_frames(&self) -> Option<u64> {
+        None
+    }
+}
+
+/// One turn of a frame source.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Grab {
+    /// A picture.
+    Frame {
+        /// The picture.
+        frame: Frame,
+        /// Seconds since the source's first frame, where the source knows
+        /// them.
+        time_s: Option<f64>,
+    },
+    /// There should be a picture, but it cannot be read.
+    Unreadable {
+        /// Its number.
+        seq: u64,
+        /// Its time as above.
+        time_s: Option<f64>,
+        /// Which file or message, and what is wrong with it.
+        reason: String,
+    },
+}
+
+/// A source that gives no more frames, with what was found, where, and what to
+/// do.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("camera {source_name}: {what}")]
+pub struct SourceError {
+    /// The source as the cell file names it.
+    pub source_name: String,
+    /// What happened and what to do.
+    pub what: String,
+}
+
+/// Takes commands to the robot.
+pub trait RobotPort {
+    /// Sends a command and returns its number on the link, or `None` where the
+    /// robot cannot take it now (no connection, or not printing); that is not
+    /// an error, because the link reports its own loss as an [`Event`].
+    fn send(&mut self, now: Stamp, command: Command) -> Option<u64>;
+}
+
+/// Keeps what happened.
+pub trait Recorder {
+    /// Keeps an event and the step that answered it, in this order. Fails when
+    /// they cannot be kept; control must not go on then.
+    fn record(&mut self, now: Stamp, event: &Event, step: &Step) -> Result<(), RecordError>;
+}
+
+/// The recording cannot be continued.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("recording: {0}")]
+pub struct RecordError(pub String);
