@@ -2,6 +2,8 @@
 //! each call.
 
 pub mod event;
+pub mod limiter;
+pub mod pi;
 pub mod step;
 
 pub use event::{Event, RobotLimits, RobotMode, RobotState};

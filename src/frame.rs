@@ -27,6 +27,20 @@ impl Pixels {
     }
 }
 
+/// Which part of a colour image is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Channel {
+    /// The luminance.
+    #[default]
+    Grey,
+    /// Red alone.
+    Red,
+    /// Green alone.
+    Green,
+    /// Blue alone.
+    Blue,
+}
+
 /// A grey image and its place in time.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Frame {

@@ -18,9 +18,12 @@
 //! `ARCHITECTURE.md`.
 
 pub mod calib;
+pub mod config;
 pub mod control;
 pub mod frame;
 pub mod geometry;
 pub mod ports;
+pub mod sim;
 pub mod time;
 pub mod units;
+pub mod vision;

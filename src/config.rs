@@ -1,0 +1,11 @@
+//! Configuration files: read strictly, with every violation reported at once,
+//! each with its line.
+
+pub mod cell;
+pub mod control;
+pub mod problem;
+pub mod rendered;
+pub mod table;
+
+pub use cell::{Camera, Cell, Mount, Recording, Robot, Source};
+pub use problem::{Problem, Problems};

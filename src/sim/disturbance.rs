@@ -1,0 +1,37 @@
+//! What the pump does to the flow along the path.
+
+use std::f64::consts::TAU;
+
+/// Flow against its nominal value, along the path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flow {
+    /// Path length at which the flow steps \[mm\].
+    pub step_at_mm: f64,
+    /// Flow from there on, as a share of the nominal flow.
+    pub step_ratio: f64,
+    /// Amplitude of a sine, as a share of the nominal flow.
+    pub wave_share: f64,
+    /// Its length along the path \[mm\].
+    pub wavelength_mm: f64,
+}
+
+impl Flow {
+    /// Flow at a path length, as a share of the nominal flow.
+    pub fn ratio_at(&self, path_mm: f64) -> f64 {
+        let step = if path_mm >= self.step_at_mm { self.step_ratio } else { 1.0 };
+        step * (1.0 + self.wave_share * (TAU * path_mm / self.wavelength_mm).sin())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_and_a_wave_multiply() {
+        let flow =
+            Flow { step_at_mm: 100.0, step_ratio: 0.92, wave_share: 0.1, wavelength_mm: 400.0 };
+        assert_eq!(flow.ratio_at(0.0), 1.0);
+        assert!((flow.ratio_at(100.0) - 0.92 * 1.1).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,111 @@
+//! Why a frame was not measured. A poor image is data, not an error.
+
+use std::fmt;
+
+/// A reason for refusing a frame, with what was found and what was needed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reject {
+    /// No two edges that belong together run through the gauge.
+    NoPair {
+        /// Share of the caliper lines on which a pair was found.
+        got: f64,
+        /// Share that is needed.
+        need: f64,
+    },
+    /// The bead hardly differs from its surroundings.
+    LowContrast {
+        /// Grey levels between ground and bead, of 256.
+        got: f64,
+        /// Grey levels that are needed.
+        need: f64,
+    },
+    /// The edges drown in saturated pixels.
+    Saturated {
+        /// Share of saturated pixels in the gauge.
+        got: f64,
+        /// Share that is bearable.
+        limit: f64,
+    },
+    /// A pair was found, but no bead of this cell is that wide.
+    WidthOutOfRange {
+        /// Width that was found \[mm\].
+        got_mm: f64,
+        /// Narrowest that is believed \[mm\].
+        min_mm: f64,
+        /// Widest that is believed \[mm\].
+        max_mm: f64,
+    },
+    /// The edges do not run along the bead's axis to within 20 degrees, or the
+    /// two do not agree.
+    Crooked {
+        /// Angle between the edges' run and the gauge's axis \[rad\].
+        got_rad: f64,
+        /// Largest angle that is measured \[rad\].
+        limit_rad: f64,
+    },
+    /// The bead touches the border of the gauge.
+    Clipped,
+    /// The gauge does not lie within the image.
+    WrongSize {
+        /// Size of the image \[px\].
+        image: (usize, usize),
+    },
+    /// The calibration has no point on the surface for an edge.
+    OffSurface,
+    /// The frame could not be read at all.
+    Unreadable,
+}
+
+impl Reject {
+    /// The status that a frame gets in `widths.csv`.
+    pub fn status(&self) -> &'static str {
+        match self {
+            Self::NoPair { .. } => "no_pair",
+            Self::LowContrast { .. } => "low_contrast",
+            Self::Saturated { .. } => "saturated",
+            Self::WidthOutOfRange { .. } => "width_out_of_range",
+            Self::Crooked { .. } => "crooked",
+            Self::Clipped => "clipped",
+            Self::WrongSize { .. } => "wrong_size",
+            Self::OffSurface => "off_surface",
+            Self::Unreadable => "unreadable",
+        }
+    }
+}
+
+impl fmt::Display for Reject {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoPair { got, need } => write!(
+                f,
+                "edges that belong together on {:.0} % of the caliper lines, {:.0} % are needed",
+                got * 100.0,
+                need * 100.0
+            ),
+            Self::LowContrast { got, need } => {
+                write!(f, "contrast of {got:.1} grey levels, {need:.1} are needed")
+            }
+            Self::Saturated { got, limit } => write!(
+                f,
+                "{:.0} % of the gauge is saturated, {:.0} % is bearable",
+                got * 100.0,
+                limit * 100.0
+            ),
+            Self::WidthOutOfRange { got_mm, min_mm, max_mm } => {
+                write!(f, "width of {got_mm:.2} mm, believed are {min_mm} to {max_mm} mm")
+            }
+            Self::Crooked { got_rad, limit_rad } => write!(
+                f,
+                "edges at {:.0} degrees to the gauge's axis, measured are up to {:.0}",
+                got_rad.to_degrees(),
+                limit_rad.to_degrees()
+            ),
+            Self::Clipped => f.write_str("the bead touches the border of the gauge"),
+            Self::WrongSize { image: (width, height) } => {
+                write!(f, "the gauge does not fit an image of {width}x{height} px")
+            }
+            Self::OffSurface => f.write_str("an edge has no point on the surface"),
+            Self::Unreadable => f.write_str("the frame could not be read"),
+        }
+    }
+}

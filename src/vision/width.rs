@@ -1,0 +1,51 @@
+//! The result of a measurement.
+
+use crate::geometry::ImagePoint;
+use crate::units::Mm;
+
+/// A width that can be trusted, and how far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WidthMeasurement {
+    /// Distance between the bead's two edges at the surface, normal to the
+    /// bead's axis, averaged over the gauge.
+    pub width: Mm,
+    /// Standard deviation of `width` against the true mean width within the
+    /// gauge, as the measurement believes it.
+    pub sigma: Mm,
+    /// Standard deviation of the width along the gauge about its mean: the
+    /// bead's own waviness, which is signal.
+    pub roughness: Mm,
+    /// Where the left (of a horizontal bead the upper) edge crosses the middle
+    /// of the gauge, in raw image pixels.
+    pub left: ImagePoint,
+    /// Where the right (of a horizontal bead the lower) edge crosses it.
+    pub right: ImagePoint,
+    /// Angle of the bead's axis to the gauge's, in the image \[rad\].
+    pub slant_rad: f64,
+    /// What the person who sets up light and lens wants to know.
+    pub hints: Hints,
+}
+
+/// How good the picture is.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Hints {
+    /// Step from ground to bead \[grey levels of 256\].
+    pub contrast_grey: f64,
+    /// Blur of the edges, as the standard deviation of a Gaussian \[px\].
+    pub blur_px: f64,
+    /// Noise of a pixel \[grey levels of 256\].
+    pub noise_grey: f64,
+    /// Share of the gauge's pixels that are at the end of the scale.
+    pub saturated_share: f64,
+    /// Share of the caliper lines that the width comes from.
+    pub used_share: f64,
+}
+
+/// The edges as they were found, caliper by caliper, in raw image pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Edges<'a> {
+    /// The left (of a horizontal bead the upper) edge.
+    pub left: &'a [ImagePoint],
+    /// The right (of a horizontal bead the lower) edge.
+    pub right: &'a [ImagePoint],
+}
