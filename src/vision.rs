@@ -1,11 +1,31 @@
 //! Measuring the bead: from grey pixels to a width with its standard
 //! deviation, or a reason for refusing. Pure, and without allocation once a
 //! [`Measurer`] has seen its first frame.
+//!
+//! ```text
+//! pool    rows → bands, one averaged profile each
+//! edge    profile → the strongest steps
+//! pair    steps → the chain of pairs that runs along the bead
+//! refine  chain → sub-pixel edges (step, fit, blur)
+//! outlier edges that disagree with their neighbours
+//! axis    edges → width normal to the bead, on the surface
+//! ```
 
+mod axis;
+mod blur;
+mod edge;
+mod fit;
 pub mod gauge;
+mod measure;
+mod outlier;
+mod pair;
+mod pool;
+mod refine;
 pub mod reject;
+mod step;
 pub mod width;
 
 pub use gauge::{Axis, Gauge, Method, Polarity};
+pub use measure::Measurer;
 pub use reject::Reject;
 pub use width::{Edges, Hints, WidthMeasurement};

@@ -1,0 +1,276 @@
+//! The caliper measurement: bands, candidates, chain, sub-pixel edges, width.
+
+use crate::calib::SurfaceMap;
+use crate::frame::{Frame, Pixels};
+use crate::geometry::ImagePoint;
+
+use super::axis::{self, Caliper};
+use super::edge::{Candidates, respond};
+use super::gauge::{Gauge, Polarity};
+use super::outlier;
+use super::pair::{Chain, Search};
+use super::pool::{Bands, View};
+use super::refine::{Refiner, Task};
+use super::reject::Reject;
+use super::step::StepTable;
+use super::width::{Edges, Hints, WidthMeasurement};
+
+/// Share of the caliper lines that must show the bead.
+const NEED_SHARE: f64 = 0.6;
+/// Share of saturated pixels from which missing contrast is laid to light.
+const MUCH_LIGHT: f64 = 0.3;
+/// Room that a search allows beyond the range of widths, for the difference
+/// between one caliper and the mean of all.
+const RANGE_SLACK: f64 = 1.5;
+/// Largest scatter of neighbouring edges about each other \[px\] that still is
+/// an edge, not noise.
+const MAX_SCATTER_PX: f64 = 1.5;
+
+/// Measures frames of one cell; keeps its memory from frame to frame.
+#[derive(Debug, Clone)]
+pub struct Measurer {
+    gauge: Gauge,
+    white: Option<u16>,
+    table: StepTable,
+    bands: Bands,
+    response: Vec<f32>,
+    sample: Vec<f32>,
+    candidates: Vec<Candidates>,
+    chain: Chain,
+    other: Chain,
+    left: Refiner,
+    right: Refiner,
+    scatter: Vec<f64>,
+    calipers: Vec<Caliper>,
+    left_px: Vec<ImagePoint>,
+    right_px: Vec<ImagePoint>,
+}
+
+impl Measurer {
+    /// For a gauge. `white` is the upper end of the camera's scale where it is
+    /// not that of the pixels, as with 12 bits in 16.
+    pub fn new(gauge: Gauge, white: Option<u16>) -> Self {
+        Self {
+            gauge,
+            white,
+            table: StepTable::default(),
+            bands: Bands::default(),
+            response: Vec::new(),
+            sample: Vec::new(),
+            candidates: Vec::new(),
+            chain: Chain::default(),
+            other: Chain::default(),
+            left: Refiner::default(),
+            right: Refiner::default(),
+            scatter: Vec::new(),
+            calipers: Vec::new(),
+            left_px: Vec::new(),
+            right_px: Vec::new(),
+        }
+    }
+
+    /// The edges behind the last width, for pictures of them.
+    pub fn edges(&self) -> Edges<'_> {
+        Edges { left: &self.left_px, right: &self.right_px }
+    }
+
+    /// Measures the bead in a frame on a surface.
+    pub fn measure(
+        &mut self,
+        frame: &Frame,
+        surface: &SurfaceMap,
+    ) -> Result<WidthMeasurement, Reject> {
+        self.left_px.clear();
+        self.right_px.clear();
+        if !self.gauge.roi.fits(frame.size()) {
+            return Err(Reject::WrongSize { image: frame.size() });
+        }
+        let white = self.white.unwrap_or(match frame.pixels() {
+            Pixels::Grey8(_) => 255,
+            Pixels::Grey16(_) => u16::MAX,
+        });
+        let view = View::new(self.gauge.roi, self.gauge.axis);
+        self.bands.pool(frame, &view, self.gauge.calipers, white);
+        self.find_candidates();
+        let range = self.search_range(&view, surface)?;
+        self.find_chain(&view, range)?;
+        let task = Task {
+            frame,
+            view: &view,
+            bands: &self.bands,
+            white,
+            width_px: typical_width(&self.chain),
+        };
+        let pairs = self.chain.pairs();
+        let left =
+            self.left.refine(&self.table, &task, true, pairs.iter().map(|p| p.map(|p| p.left)));
+        let right =
+            self.right.refine(&self.table, &task, false, pairs.iter().map(|p| p.map(|p| p.right)));
+        if !(left && right) {
+            return Err(Reject::NoPair { got: 0.0, need: NEED_SHARE });
+        }
+        self.sort_out()?;
+        self.check_contrast()?;
+        self.to_width(&view, surface)
+    }
+
+    fn find_candidates(&mut self) {
+        let count = self.bands.count();
+        let across = self.bands.profile(0).len();
+        self.response.resize(across * count, 0.0);
+        for (band, response) in self.response.chunks_exact_mut(across).enumerate() {
+            respond(self.bands.profile(band), response);
+        }
+        let floor = self.floor();
+        self.candidates.clear();
+        self.candidates
+            .extend(self.response.chunks_exact(across).map(|r| Candidates::find(r, floor)));
+    }
+
+    /// Smallest step that is looked at: above most of what noise makes, and
+    /// well below what is believed in the end.
+    fn floor(&mut self) -> f32 {
+        self.sample.clear();
+        self.sample.extend(self.response.iter().step_by(13).map(|step| step.abs()));
+        let middle = self.sample.len() / 2;
+        let typical = if self.sample.is_empty() {
+            0.0
+        } else {
+            1.4826 * *self.sample.select_nth_unstable_by(middle, f32::total_cmp).1
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
+        let least = (0.4 * self.gauge.min_contrast_grey) as f32;
+        least.max(1.5 * typical)
+    }
+
+    /// The believed widths in pixels across the gauge's middle.
+    fn search_range(&self, view: &View, surface: &SurfaceMap) -> Result<(f32, f32), Reject> {
+        #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+        let (u, v) = (view.across as f64 / 2.0, view.along as f64 / 2.0);
+        let middle = surface.to_mm(view.to_image(u, v)).ok_or(Reject::OffSurface)?;
+        let beside = surface.to_mm(view.to_image(u + 1.0, v)).ok_or(Reject::OffSurface)?;
+        let mm_per_px = (beside - middle).norm();
+        let (min, max) = self.gauge.width_range;
+        #[expect(clippy::cast_possible_truncation, reason = "widths in pixels")]
+        let range = (
+            (min.get() / mm_per_px / RANGE_SLACK) as f32,
+            (max.get() / mm_per_px * RANGE_SLACK) as f32,
+        );
+        Ok(range)
+    }
+
+    fn find_chain(&mut self, view: &View, range: (f32, f32)) -> Result<(), Reject> {
+        self.search(view, range);
+        let got = self.chain.share();
+        if got >= NEED_SHARE {
+            return Ok(());
+        }
+        let refused = Reject::NoPair { got, need: NEED_SHARE };
+        // A bead of another width deserves to be called that.
+        self.search(view, (4.0, f32::MAX));
+        if self.chain.share() < NEED_SHARE || !self.is_strong() {
+            return Err(self.too_much_light().unwrap_or(refused));
+        }
+        Ok(())
+    }
+
+    fn search(&mut self, view: &View, width_px: (f32, f32)) {
+        #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+        let band_px = view.along as f32 / self.bands.count().max(1) as f32;
+        let bright = self.gauge.polarity != Polarity::Dark;
+        self.chain.search(&self.candidates, &Search { bright, width_px, band_px });
+        if self.gauge.polarity == Polarity::Any {
+            self.other.search(&self.candidates, &Search { bright: false, width_px, band_px });
+            if self.other.score() > self.chain.score() {
+                std::mem::swap(&mut self.chain, &mut self.other);
+            }
+        }
+    }
+
+    /// Whether the chain's steps are far above the noise.
+    fn is_strong(&self) -> bool {
+        let pairs = self.chain.pairs();
+        let steps: f32 = pairs.iter().flatten().map(|pair| pair.step).sum();
+        #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
+        let mean = steps / pairs.iter().flatten().count().max(1) as f32;
+        f64::from(mean) >= self.gauge.min_contrast_grey
+    }
+
+    fn too_much_light(&self) -> Option<Reject> {
+        let got = self.bands.saturated_share();
+        (got > MUCH_LIGHT).then_some(Reject::Saturated { got, limit: MUCH_LIGHT })
+    }
+
+    /// Takes out calipers that disagree with their neighbours, on either edge.
+    fn sort_out(&mut self) -> Result<(), Reject> {
+        let mut worst: f64 = 0.0;
+        for side in [&mut self.left, &mut self.right] {
+            worst = worst.max(outlier::sort_out(side.edges_mut(), &mut self.scatter));
+        }
+        let both = self.left.edges().iter().zip(self.right.edges());
+        let used = both.filter(|(left, right)| left.is_some() && right.is_some()).count();
+        #[expect(clippy::cast_precision_loss, reason = "a share needs no more")]
+        let got = used as f64 / self.bands.count().max(1) as f64;
+        if got < NEED_SHARE || worst > MAX_SCATTER_PX {
+            let got = if worst > MAX_SCATTER_PX { 0.0 } else { got };
+            return Err(Reject::NoPair { got, need: NEED_SHARE });
+        }
+        Ok(())
+    }
+
+    fn check_contrast(&mut self) -> Result<(), Reject> {
+        let need = self.gauge.min_contrast_grey;
+        let got = self.contrast(true).min(self.contrast(false));
+        if got < need {
+            return Err(self.too_much_light().unwrap_or(Reject::LowContrast { got, need }));
+        }
+        Ok(())
+    }
+
+    /// Median height of an edge's steps \[grey levels\].
+    fn contrast(&mut self, left: bool) -> f64 {
+        let side = if left { &self.left } else { &self.right };
+        self.scatter.clear();
+        self.scatter.extend(side.edges().iter().flatten().map(|edge| edge.height.abs()));
+        let middle = self.scatter.len() / 2;
+        if self.scatter.is_empty() {
+            return 0.0;
+        }
+        *self.scatter.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+
+    fn to_width(&mut self, view: &View, surface: &SurfaceMap) -> Result<WidthMeasurement, Reject> {
+        let hints = Hints {
+            contrast_grey: f64::midpoint(self.contrast(true), self.contrast(false)),
+            blur_px: f64::midpoint(self.left.blur_px, self.right.blur_px),
+            noise_grey: f64::midpoint(self.left.noise_grey, self.right.noise_grey),
+            saturated_share: self.bands.saturated_share(),
+            used_share: 0.0,
+        };
+        self.calipers.clear();
+        for (band, pair) in self.left.edges().iter().zip(self.right.edges()).enumerate() {
+            if let (Some(left), Some(right)) = pair {
+                self.calipers.push(Caliper {
+                    along: self.bands.middle(band),
+                    left: *left,
+                    right: *right,
+                });
+                let v = self.bands.middle(band);
+                self.left_px.push(view.to_image(left.at, v));
+                self.right_px.push(view.to_image(right.at, v));
+            }
+        }
+        axis::width(&self.calipers, self.bands.count(), view, surface, &self.gauge, hints)
+    }
+}
+
+/// Median width of the chain's pairs \[px\], for the size of windows; the
+/// mean will do.
+fn typical_width(chain: &Chain) -> f64 {
+    let (mut sum, mut n) = (0.0, 0.0);
+    for pair in chain.pairs().iter().flatten() {
+        sum += f64::from(pair.right - pair.left);
+        n += 1.0;
+    }
+    sum / f64::max(n, 1.0)
+}
