@@ -2,9 +2,11 @@
 //! each call.
 
 pub mod event;
+pub mod follow;
 pub mod limiter;
 pub mod pi;
 pub mod step;
+pub mod transport;
 
 pub use event::{Event, RobotLimits, RobotMode, RobotState};
 pub use step::{Command, Fault, Hold, Limit, State, Step, Trace};

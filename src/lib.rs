@@ -20,6 +20,7 @@
 pub mod calib;
 pub mod config;
 pub mod control;
+pub mod controller;
 pub mod frame;
 pub mod geometry;
 pub mod ports;

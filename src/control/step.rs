@@ -68,6 +68,8 @@ pub enum Fault {
     SpeedMismatch,
     /// The robot stopped with a fault of its own.
     Robot,
+    /// The robot stopped without having been told to.
+    RobotStopped,
 }
 
 /// The state that the controller is in after a step.

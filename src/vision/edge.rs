@@ -5,7 +5,7 @@
 pub const REACH: usize = 4;
 
 /// Steps of each sign that are kept a profile.
-pub const KEPT: usize = 10;
+pub const KEPT: usize = 16;
 
 /// A place where a profile steps.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -126,14 +126,14 @@ mod tests {
 
     #[test]
     fn only_the_strongest_are_kept() {
-        let mut response = vec![0.0f32; 60];
-        for k in 0..14u8 {
-            response[5 + 4 * usize::from(k)] = f32::from((k * 5) % 14 + 1);
+        let mut response = vec![0.0f32; 100];
+        for k in 0..20u8 {
+            response[5 + 4 * usize::from(k)] = f32::from((k * 7) % 20 + 1);
         }
         let found = Candidates::find(&response, 1.0);
         let mut steps: Vec<f32> = found.up().iter().map(|c| c.step).collect();
         steps.sort_by(f32::total_cmp);
-        assert_eq!(steps, [5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0]);
+        assert_eq!(steps, (5..=20u8).map(f32::from).collect::<Vec<f32>>());
     }
 
     #[test]

@@ -5,7 +5,7 @@
 use super::edge::{Candidate, Candidates};
 
 /// Pairs that are looked at a band.
-const PAIRS: usize = 8;
+const PAIRS: usize = 12;
 /// Bands that a chain may jump over at once.
 const MAX_SKIP: usize = 4;
 /// Cost of a band without a pair, in typical pairs.
