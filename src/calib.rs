@@ -1,8 +1,13 @@
 //! What a pixel means in millimetres: the calibration model, its file, and how
 //! it is found from pictures of a checkerboard.
 
+pub mod board;
 pub mod camera;
+pub mod file;
 pub mod model;
+pub mod plane;
+pub mod scale;
+pub mod solve;
 
 pub use camera::Camera;
 pub use model::{Calibration, Quality, SurfaceMap};

@@ -1,6 +1,10 @@
 //! One picture of the bead: grey pixels that are owned, and when they were
 //! captured.
 
+mod channel;
+
+pub use channel::{Channel, Layout, Sample, UnknownChannel};
+
 use crate::time::Stamp;
 
 /// Grey values, row by row, without padding.
@@ -25,20 +29,6 @@ impl Pixels {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-}
-
-/// Which part of a colour image is measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Channel {
-    /// The luminance.
-    #[default]
-    Grey,
-    /// Red alone.
-    Red,
-    /// Green alone.
-    Green,
-    /// Blue alone.
-    Blue,
 }
 
 /// A grey image and its place in time.

@@ -1,7 +1,7 @@
 //! Points, rectangles and the pose of a plane. Pixel (0, 0) is the centre of
 //! the top-left pixel; x runs right, y runs down.
 
-use nalgebra::{Point2, Point3, Rotation3, Vector3};
+use nalgebra::{Point2, Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// A point in the image \[px\].
 pub type ImagePoint = Point2<f64>;
@@ -57,9 +57,16 @@ impl Pose {
         self.rotation.inverse() * outer
     }
 
-    /// The rotation as a Rodrigues vector \[rad\].
+    /// From a rotation and a translation \[mm\].
+    pub fn from_parts(rotation: Rotation3<f64>, translation_mm: Vector3<f64>) -> Self {
+        Self { rotation, translation: translation_mm }
+    }
+
+    /// The rotation as a Rodrigues vector \[rad\]. By way of a quaternion,
+    /// because a matrix of half a turn (a camera that looks straight down)
+    /// does not show its axis in its skew part.
     pub fn rotation_rad(&self) -> Vector3<f64> {
-        self.rotation.scaled_axis()
+        UnitQuaternion::from_rotation_matrix(&self.rotation).scaled_axis()
     }
 
     /// The rotation.
@@ -70,5 +77,21 @@ impl Pose {
     /// Origin of the inner frame in the outer one \[mm\].
     pub fn translation_mm(&self) -> Vector3<f64> {
         self.translation
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn a_rodrigues_vector_is_read_back_up_to_half_a_turn() {
+        for turn in [[0.0; 3], [PI, 0.0, 0.0], [1e-9, 0.0, 0.0], [2.9, 0.1, -0.05], [0.0, -2.0, 1.0]] {
+            let turn = Vector3::from(turn);
+            let back = Pose::new(turn, Vector3::zeros()).rotation_rad();
+            let same = (back - turn).norm().min((back + turn).norm() + (turn.norm() - PI).abs());
+            assert!(same < 1e-12, "{turn} came back as {back}");
+        }
     }
 }

@@ -17,12 +17,15 @@
 //! `CONVENTIONS.md`; how the modules depend on each other is in
 //! `ARCHITECTURE.md`.
 
+pub mod bridge;
 pub mod calib;
+pub mod cli;
 pub mod config;
 pub mod control;
 pub mod controller;
 pub mod frame;
 pub mod geometry;
+pub mod io;
 pub mod ports;
 pub mod sim;
 pub mod time;

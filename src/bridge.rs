@@ -1,0 +1,79 @@
+//! The one place that knows OpenCV. Its types do not leave this module: frames
+//! and numbers go in, numbers and frames come out.
+
+mod board;
+mod camera;
+mod lines;
+mod video;
+
+pub use board::find_board;
+pub use camera::{BoardView, CameraFit, calibrate_camera, solve_pose};
+pub use lines::{EdgeSettings, Segment, canny_hough};
+pub use video::{VideoInput, VideoReader};
+
+use std::sync::Once;
+
+use opencv::core::{LogLevel, Mat, MatTraitConst, set_log_level, set_num_threads};
+
+use crate::frame::{Frame, Pixels};
+
+/// OpenCV refused a task.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{task} failed in OpenCV: {what}")]
+pub struct BridgeError {
+    /// What was being done.
+    pub task: &'static str,
+    /// What OpenCV said.
+    pub what: String,
+}
+
+/// Names the task in an error of OpenCV's.
+fn during(task: &'static str) -> impl Fn(opencv::Error) -> BridgeError {
+    move |error| BridgeError { task, what: error.message.trim().to_owned() }
+}
+
+/// Makes OpenCV work in the caller's thread, so that a measurement takes the
+/// same time whatever else runs, and keeps it from writing to standard error:
+/// what it has to say comes back as an error.
+fn prepare() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        // Neither can fail in a way that matters: the work is the same with
+        // more threads and more words.
+        let _ = set_num_threads(1);
+        let _ = set_log_level(LogLevel::LOG_LEVEL_SILENT);
+    });
+}
+
+/// The grey values with 8 bits as OpenCV's own matrix. What is darkest in a
+/// 16-bit image becomes 0, what is brightest 255, because 10 or 12 bits are
+/// often all that is used of 16.
+fn grey8_mat(frame: &Frame) -> Result<Mat, BridgeError> {
+    match frame.pixels() {
+        Pixels::Grey8(values) => mat_of(frame, values),
+        Pixels::Grey16(values) => {
+            let (low, high) = range(values);
+            let span = u32::from(high - low).max(1);
+            let scaled: Vec<u8> = values
+                .iter()
+                .map(|&v| ((u32::from(v - low) * 255 + span / 2) / span).to_le_bytes()[0])
+                .collect();
+            mat_of(frame, &scaled)
+        }
+    }
+}
+
+fn range(values: &[u16]) -> (u16, u16) {
+    values.iter().fold((u16::MAX, 0), |(low, high), &v| (low.min(v), high.max(v)))
+}
+
+fn mat_of<T: opencv::core::DataType>(frame: &Frame, values: &[T]) -> Result<Mat, BridgeError> {
+    let task = "taking over a frame";
+    let side = |px: usize| {
+        i32::try_from(px)
+            .map_err(|_| BridgeError { task, what: format!("a side of {px} px is too long") })
+    };
+    Mat::new_rows_cols_with_data(side(frame.height())?, side(frame.width())?, values)
+        .and_then(|borrowed| borrowed.try_clone())
+        .map_err(during(task))
+}

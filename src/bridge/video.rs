@@ -1,0 +1,157 @@
+//! Video files, cameras and GStreamer pipelines.
+
+use std::path::PathBuf;
+
+use opencv::core::{CV_8U, CV_16U, Mat, MatTraitConst, MatTraitConstManual};
+use opencv::videoio::{
+    CAP_ANY, CAP_GSTREAMER, CAP_PROP_BUFFERSIZE, CAP_PROP_CODEC_PIXEL_FORMAT,
+    CAP_PROP_CONVERT_RGB, CAP_PROP_FPS, CAP_PROP_FRAME_COUNT, VideoCapture, VideoCaptureTrait,
+    VideoCaptureTraitConst,
+};
+
+use super::{BridgeError, during, prepare};
+use crate::frame::{Channel, Frame, Layout, Pixels};
+use crate::time::Stamp;
+
+/// Where moving pictures come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum VideoInput {
+    /// A video file.
+    File(PathBuf),
+    /// A camera by its number.
+    Camera(u32),
+    /// A GStreamer pipeline. It may end in an `appsink` of its own; where it
+    /// names none, one that keeps only the newest picture is added.
+    Pipeline(String),
+}
+
+/// Reads pictures one after the other.
+#[derive(Debug)]
+pub struct VideoReader {
+    capture: VideoCapture,
+    image: Mat,
+}
+
+const OPEN: &str = "opening a video source";
+const READ: &str = "reading a picture";
+const APPSINK: &str = " ! appsink drop=true max-buffers=1 sync=false";
+
+impl VideoReader {
+    /// Opens an input; fails where OpenCV finds no decoder, device or pipeline
+    /// for it.
+    pub fn open(input: &VideoInput) -> Result<Self, BridgeError> {
+        prepare();
+        let capture = match input {
+            VideoInput::File(path) => VideoCapture::from_file(path, CAP_ANY),
+            VideoInput::Camera(index) => {
+                VideoCapture::new(i32::try_from(*index).unwrap_or(i32::MAX), CAP_ANY)
+            }
+            VideoInput::Pipeline(text) => {
+                let sink = if text.contains("appsink") { "" } else { APPSINK };
+                VideoCapture::from_file(format!("{text}{sink}"), CAP_GSTREAMER)
+            }
+        };
+        let mut capture = capture.map_err(during(OPEN))?;
+        if !capture.is_opened().map_err(during(OPEN))? {
+            return Err(BridgeError { task: OPEN, what: refusal(input).to_owned() });
+        }
+        match input {
+            VideoInput::File(_) => keep_grey_grey(&mut capture),
+            // Fewer pictures in the queue are fresher pictures. Not every
+            // driver can; it makes no difference to what is read.
+            VideoInput::Camera(_) => drop(capture.set(CAP_PROP_BUFFERSIZE, 1.0)),
+            VideoInput::Pipeline(_) => {}
+        }
+        Ok(Self { capture, image: Mat::default() })
+    }
+
+    /// Waits for the next picture without decoding it, so that the moment can
+    /// be noted. `false` at the end, or where no picture comes.
+    pub fn grab(&mut self) -> Result<bool, BridgeError> {
+        self.capture.grab().map_err(during(READ))
+    }
+
+    /// Decodes the picture that was grabbed. `None` where it cannot be.
+    pub fn retrieve(
+        &mut self,
+        channel: Channel,
+        seq: u64,
+        captured_at: Stamp,
+    ) -> Result<Option<Frame>, BridgeError> {
+        let decoded = self.capture.retrieve(&mut self.image, 0).map_err(during(READ))?;
+        if !decoded || self.image.empty() {
+            return Ok(None);
+        }
+        frame_of(&self.image, channel, seq, captured_at).map(Some)
+    }
+
+    /// Pictures a second, where the input says so.
+    pub fn fps(&self) -> Option<f64> {
+        let fps = self.capture.get(CAP_PROP_FPS).ok()?;
+        (fps.is_finite() && fps > 0.0).then_some(fps)
+    }
+
+    /// Pictures in the file as its header has them, which may be an estimate.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a positive number; the cast saturates"
+    )]
+    pub fn frame_count(&self) -> Option<u64> {
+        let count = self.capture.get(CAP_PROP_FRAME_COUNT).ok()?;
+        (count.is_finite() && count >= 1.0).then_some(count as u64)
+    }
+}
+
+fn refusal(input: &VideoInput) -> &'static str {
+    match input {
+        VideoInput::File(_) => "no decoder takes it; is it a whole video file?",
+        VideoInput::Camera(_) => {
+            "there is no such camera, it is in use, or this user may not open it"
+        }
+        VideoInput::Pipeline(_) => {
+            "the pipeline does not start, or this OpenCV has no GStreamer; try it with gst-launch-1.0"
+        }
+    }
+}
+
+/// Asks for grey pictures of more than 8 bits as they are stored; by default
+/// every picture is turned into 8-bit colour.
+fn keep_grey_grey(capture: &mut VideoCapture) {
+    let deep_grey = f64::from(u32::from_le_bytes(*b"Y1\0\x10"));
+    let format = capture.get(CAP_PROP_CODEC_PIXEL_FORMAT).unwrap_or(-1.0);
+    if (format - deep_grey).abs() < 0.5 {
+        // Where it is refused, the pictures come with 8 bits.
+        drop(capture.set(CAP_PROP_CONVERT_RGB, 0.0));
+    }
+}
+
+fn frame_of(
+    image: &Mat,
+    channel: Channel,
+    seq: u64,
+    captured_at: Stamp,
+) -> Result<Frame, BridgeError> {
+    let fault = |what: String| BridgeError { task: READ, what };
+    let layout = match image.channels() {
+        1 => Layout::Grey,
+        3 => Layout::Bgr,
+        4 => Layout::Bgra,
+        other => return Err(fault(format!("a picture with {other} channels is not known"))),
+    };
+    let flat = image.reshape(1, 0).map_err(during(READ))?;
+    let pixels = match image.depth() {
+        CV_8U => {
+            let samples = flat.data_typed::<u8>().map_err(during(READ))?;
+            Pixels::Grey8(channel.extract(samples, layout))
+        }
+        CV_16U => {
+            let samples = flat.data_typed::<u16>().map_err(during(READ))?;
+            Pixels::Grey16(channel.extract(samples, layout))
+        }
+        _ => return Err(fault("only samples of 8 and 16 bits are measured".to_owned())),
+    };
+    let side = |px: i32| usize::try_from(px).unwrap_or(0);
+    Frame::new(seq, captured_at, (side(image.cols()), side(image.rows())), pixels)
+        .map_err(|error| fault(error.to_string()))
+}

@@ -1,0 +1,177 @@
+//! The checkerboard: where its inner corners are, and whether what was found
+//! in a picture can be them.
+
+use nalgebra::Point3;
+
+use crate::geometry::ImagePoint;
+use crate::units::Mm;
+
+/// A checkerboard of `columns` by `rows` inner corners.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Board {
+    columns: usize,
+    rows: usize,
+    square: Mm,
+}
+
+/// A board that cannot be used.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum BoardError {
+    /// Too few or too many corners.
+    #[error(
+        "a board has 3 to 100 inner corners along each side, found {columns}x{rows}; \
+         inner corners are where four squares meet, one fewer than the squares"
+    )]
+    Corners {
+        /// Inner corners along a row.
+        columns: usize,
+        /// Inner corners along a column.
+        rows: usize,
+    },
+    /// No size.
+    #[error("the side of a square must be more than 0 mm, found {0}")]
+    Square(Mm),
+}
+
+/// Corners that are not those of a board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NotABoard {
+    /// Not as many as the board has.
+    #[error("{found} corners instead of {expected}")]
+    Count {
+        /// Corners that were found.
+        found: usize,
+        /// Corners of the board.
+        expected: usize,
+    },
+    /// The square at this corner has no area, or the grid folds over there.
+    #[error("the corners do not form a grid at column {column}, row {row}")]
+    Folded {
+        /// Column of the square, from 0.
+        column: usize,
+        /// Row of the square, from 0.
+        row: usize,
+    },
+}
+
+/// Area of a square in the picture below which it has collapsed to a line
+/// \[px²\].
+const SMALLEST_SQUARE_PX2: f64 = 1.0;
+
+impl Board {
+    /// Fails without a grid of at least 3 by 3 corners or a size.
+    pub fn new(columns: usize, rows: usize, square: Mm) -> Result<Self, BoardError> {
+        let sound = 3..=100;
+        if !sound.contains(&columns) || !sound.contains(&rows) {
+            return Err(BoardError::Corners { columns, rows });
+        }
+        if square <= Mm::ZERO {
+            return Err(BoardError::Square(square));
+        }
+        Ok(Self { columns, rows, square })
+    }
+
+    /// Inner corners along a row and along a column.
+    pub fn corners(&self) -> (usize, usize) {
+        (self.columns, self.rows)
+    }
+
+    /// The side of a square.
+    pub fn square(&self) -> Mm {
+        self.square
+    }
+
+    /// The inner corners on the board, row by row \[mm\]: x along a row, y along
+    /// a column, the first at the origin.
+    #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
+    pub fn corners_mm(&self) -> Vec<Point3<f64>> {
+        let side = self.square.get();
+        (0..self.rows)
+            .flat_map(|row| (0..self.columns).map(move |column| (column as f64, row as f64)))
+            .map(|(x, y)| Point3::new(x * side, y * side, 0.0))
+            .collect()
+    }
+
+    /// Checks that corners form a grid that is nowhere collinear or folded, and
+    /// puts rows that were counted in the mirror the right way round, so that
+    /// x, y and the view turn like the axes of the camera.
+    pub fn order(&self, mut corners: Vec<ImagePoint>) -> Result<Vec<ImagePoint>, NotABoard> {
+        let expected = self.columns * self.rows;
+        if corners.len() != expected {
+            return Err(NotABoard::Count { found: corners.len(), expected });
+        }
+        if self.square_area(&corners, 0, 0) < 0.0 {
+            corners.chunks_mut(self.columns).for_each(<[ImagePoint]>::reverse);
+        }
+        for row in 0..self.rows - 1 {
+            for column in 0..self.columns - 1 {
+                let area = self.square_area(&corners, column, row);
+                if area.is_nan() || area < SMALLEST_SQUARE_PX2 {
+                    return Err(NotABoard::Folded { column, row });
+                }
+            }
+        }
+        Ok(corners)
+    }
+
+    /// Signed area of a square in the picture \[px²\], positive where x turns to
+    /// y as in the picture's axes. The smaller of its two triangles, so that a
+    /// square with a corner turned in does not pass.
+    fn square_area(&self, corners: &[ImagePoint], column: usize, row: usize) -> f64 {
+        let at = |c: usize, r: usize| corners[(row + r) * self.columns + column + c];
+        let first = (at(1, 0) - at(0, 0)).perp(&(at(0, 1) - at(0, 0)));
+        let second = (at(0, 1) - at(1, 1)).perp(&(at(1, 0) - at(1, 1)));
+        if first < 0.0 && second < 0.0 { first.max(second) } else { first.min(second) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point2;
+
+    fn board() -> Board {
+        Board::new(4, 3, Mm::constant(20.0)).unwrap()
+    }
+
+    fn seen(board: &Board) -> Vec<ImagePoint> {
+        board.corners_mm().iter().map(|p| Point2::new(100.0 + p.x, 50.0 + p.y)).collect()
+    }
+
+    #[test]
+    fn corners_run_row_by_row_in_millimetres() {
+        let corners = board().corners_mm();
+        assert_eq!(corners.len(), 12);
+        assert_eq!(corners[3], Point3::new(60.0, 0.0, 0.0));
+        assert_eq!(corners[4], Point3::new(0.0, 20.0, 0.0));
+    }
+
+    #[test]
+    fn rows_counted_in_the_mirror_are_turned_round() {
+        let board = board();
+        let straight = seen(&board);
+        let mirrored: Vec<_> = straight.chunks(4).flat_map(|row| row.iter().rev().copied()).collect();
+        assert_eq!(board.order(mirrored).unwrap(), straight);
+        assert_eq!(board.order(straight.clone()).unwrap(), straight);
+        // Half a turn is as good as none.
+        let turned: Vec<_> = straight.iter().rev().copied().collect();
+        assert_eq!(board.order(turned.clone()).unwrap(), turned);
+    }
+
+    #[test]
+    fn what_is_not_a_grid_is_refused() {
+        let board = board();
+        let mut folded = seen(&board);
+        folded.swap(5, 6);
+        assert!(matches!(board.order(folded), Err(NotABoard::Folded { .. })));
+        let line = seen(&board).iter().map(|p| Point2::new(p.x, 50.0 + p.x)).collect();
+        assert_eq!(board.order(line), Err(NotABoard::Folded { column: 0, row: 0 }));
+        assert_eq!(board.order(vec![]), Err(NotABoard::Count { found: 0, expected: 12 }));
+    }
+
+    #[test]
+    fn a_board_needs_a_grid_and_a_size() {
+        assert!(Board::new(2, 6, Mm::constant(20.0)).is_err());
+        assert!(Board::new(9, 6, Mm::ZERO).is_err());
+    }
+}
