@@ -6,6 +6,7 @@ pub mod camera;
 pub mod file;
 pub mod model;
 pub mod plane;
+pub mod quality;
 pub mod scale;
 pub mod solve;
 

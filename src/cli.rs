@@ -1,1 +1,3 @@
-//! placeholder
+//! What a person types: one file a command.
+
+pub mod calibrate;

@@ -87,7 +87,9 @@ mod tests {
 
     #[test]
     fn a_rodrigues_vector_is_read_back_up_to_half_a_turn() {
-        for turn in [[0.0; 3], [PI, 0.0, 0.0], [1e-9, 0.0, 0.0], [2.9, 0.1, -0.05], [0.0, -2.0, 1.0]] {
+        for turn in
+            [[0.0; 3], [PI, 0.0, 0.0], [1e-9, 0.0, 0.0], [2.9, 0.1, -0.05], [0.0, -2.0, 1.0]]
+        {
             let turn = Vector3::from(turn);
             let back = Pose::new(turn, Vector3::zeros()).rotation_rad();
             let same = (back - turn).norm().min((back + turn).norm() + (turn.norm() - PI).abs());

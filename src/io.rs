@@ -1,5 +1,7 @@
 //! Files, devices, sockets and the clock: everything outside the core.
 
+pub mod calibration_file;
 pub mod camera;
 pub mod clock;
 pub mod image_file;
+pub mod whole_file;

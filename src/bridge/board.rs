@@ -5,9 +5,7 @@ use opencv::calib3d::{
     CALIB_CB_ACCURACY, CALIB_CB_ADAPTIVE_THRESH, CALIB_CB_EXHAUSTIVE, CALIB_CB_NORMALIZE_IMAGE,
     find_chessboard_corners, find_chessboard_corners_sb,
 };
-use opencv::core::{
-    Mat, Point2f, Size, TermCriteria, TermCriteria_Type, Vector,
-};
+use opencv::core::{Mat, Point2f, Size, TermCriteria, TermCriteria_Type, Vector};
 use opencv::imgproc::corner_sub_pix;
 
 use super::{BridgeError, during, grey8_mat, mat_of, prepare};
@@ -47,11 +45,7 @@ pub fn find_board(
     Ok(Some(corners.iter().map(|p| Point2::new(f64::from(p.x), f64::from(p.y))).collect()))
 }
 
-fn search(
-    image: &Mat,
-    pattern: Size,
-    corners: &mut Vector<Point2f>,
-) -> opencv::Result<bool> {
+fn search(image: &Mat, pattern: Size, corners: &mut Vector<Point2f>) -> opencv::Result<bool> {
     let quads = CALIB_CB_ADAPTIVE_THRESH | CALIB_CB_NORMALIZE_IMAGE;
     if find_chessboard_corners(image, pattern, corners, quads)? {
         return Ok(true);
@@ -63,11 +57,7 @@ fn search(
 
 /// Moves each corner to where the gradients around it are all at right angles
 /// to the line from the corner. 16-bit values are used as they are.
-fn refine(
-    frame: &Frame,
-    columns: usize,
-    corners: &mut Vector<Point2f>,
-) -> Result<(), BridgeError> {
+fn refine(frame: &Frame, columns: usize, corners: &mut Vector<Point2f>) -> Result<(), BridgeError> {
     let image = match frame.pixels() {
         Pixels::Grey8(values) => mat_of(frame, values)?,
         Pixels::Grey16(values) => {

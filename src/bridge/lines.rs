@@ -57,11 +57,7 @@ pub fn canny_hough(
     Ok(lines.iter().map(|l| Segment { from: end(l[0], l[1]), to: end(l[2], l[3]) }).collect())
 }
 
-fn lines_within(
-    image: &Mat,
-    roi: Roi,
-    settings: &EdgeSettings,
-) -> opencv::Result<Vector<Vec4i>> {
+fn lines_within(image: &Mat, roi: Roi, settings: &EdgeSettings) -> opencv::Result<Vector<Vec4i>> {
     let window = Rect::new(
         coordinate(roi.x),
         coordinate(roi.y),
@@ -124,8 +120,10 @@ mod tests {
         let roi = Roi { x: 20, y: 10, width: 160, height: 100 };
         let lines = canny_hough(&bar(), roi, &SETTINGS).unwrap();
         for edge in [59.5, 139.5] {
-            let near = |s: &&Segment| (s.from.x - edge).abs() <= 1.0 && (s.to.x - edge).abs() <= 1.0;
-            let length = lines.iter().filter(near).map(|s| (s.to - s.from).norm()).fold(0.0, f64::max);
+            let near =
+                |s: &&Segment| (s.from.x - edge).abs() <= 1.0 && (s.to.x - edge).abs() <= 1.0;
+            let length =
+                lines.iter().filter(near).map(|s| (s.to - s.from).norm()).fold(0.0, f64::max);
             assert!(length > 80.0, "edge at {edge}: {lines:?}");
         }
         assert_eq!(lines, canny_hough(&bar(), roi, &SETTINGS).unwrap());

@@ -4,9 +4,8 @@ use std::path::PathBuf;
 
 use opencv::core::{CV_8U, CV_16U, Mat, MatTraitConst, MatTraitConstManual};
 use opencv::videoio::{
-    CAP_ANY, CAP_GSTREAMER, CAP_PROP_BUFFERSIZE, CAP_PROP_CODEC_PIXEL_FORMAT,
-    CAP_PROP_CONVERT_RGB, CAP_PROP_FPS, CAP_PROP_FRAME_COUNT, VideoCapture, VideoCaptureTrait,
-    VideoCaptureTraitConst,
+    CAP_ANY, CAP_GSTREAMER, CAP_PROP_BUFFERSIZE, CAP_PROP_CODEC_PIXEL_FORMAT, CAP_PROP_CONVERT_RGB,
+    CAP_PROP_FPS, CAP_PROP_FRAME_COUNT, VideoCapture, VideoCaptureTrait, VideoCaptureTraitConst,
 };
 
 use super::{BridgeError, during, prepare};
@@ -19,7 +18,7 @@ pub enum VideoInput {
     /// A video file.
     File(PathBuf),
     /// A camera by its number.
-    Camera(u32),
+    Camera(i32),
     /// A GStreamer pipeline. It may end in an `appsink` of its own; where it
     /// names none, one that keeps only the newest picture is added.
     Pipeline(String),
@@ -43,9 +42,7 @@ impl VideoReader {
         prepare();
         let capture = match input {
             VideoInput::File(path) => VideoCapture::from_file(path, CAP_ANY),
-            VideoInput::Camera(index) => {
-                VideoCapture::new(i32::try_from(*index).unwrap_or(i32::MAX), CAP_ANY)
-            }
+            VideoInput::Camera(index) => VideoCapture::new(*index, CAP_ANY),
             VideoInput::Pipeline(text) => {
                 let sink = if text.contains("appsink") { "" } else { APPSINK };
                 VideoCapture::from_file(format!("{text}{sink}"), CAP_GSTREAMER)

@@ -150,7 +150,8 @@ mod tests {
     fn rows_counted_in_the_mirror_are_turned_round() {
         let board = board();
         let straight = seen(&board);
-        let mirrored: Vec<_> = straight.chunks(4).flat_map(|row| row.iter().rev().copied()).collect();
+        let mirrored: Vec<_> =
+            straight.chunks(4).flat_map(|row| row.iter().rev().copied()).collect();
         assert_eq!(board.order(mirrored).unwrap(), straight);
         assert_eq!(board.order(straight.clone()).unwrap(), straight);
         // Half a turn is as good as none.

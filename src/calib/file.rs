@@ -1,0 +1,227 @@
+//! The calibration file as text. Version 1; see `calib/README.md` for every
+//! key.
+
+use std::fmt::Write;
+
+use nalgebra::{Point2, Point3, Vector3};
+
+use super::{Calibration, Camera, Quality};
+use crate::config::Problems;
+use crate::config::table::{Document, Table};
+use crate::geometry::Pose;
+use crate::units::Mm;
+
+/// Largest image side that is taken \[px\].
+const MAX_SIDE_PX: f64 = 65_536.0;
+/// A focal length of less is no lens, of more no camera \[px\].
+const FOCAL_PX: std::ops::RangeInclusive<f64> = 1.0..=1e7;
+const CENTRE_PX: std::ops::RangeInclusive<f64> = -1e6..=1e6;
+const DISTORTION: std::ops::RangeInclusive<f64> = -1e6..=1e6;
+/// A Rodrigues vector is a turn of at most one round an axis.
+const TURN_RAD: std::ops::RangeInclusive<f64> = -6.3..=6.3;
+const LENGTH_MM: std::ops::RangeInclusive<f64> = -1e6..=1e6;
+const RMS_PX: std::ops::RangeInclusive<f64> = 0.0..=1e3;
+
+/// Reads the text of a calibration file; `file` is its name in what is said
+/// about it. Everything that is wrong is reported at once.
+pub fn parse(file: &str, text: &str) -> Result<Calibration, Problems> {
+    let document = Document::parse(file, text, true);
+    let calibration = read_root(&document.root());
+    document.finish(calibration)
+}
+
+fn read_root(root: &Table<'_>) -> Option<Calibration> {
+    if !root.has("version") {
+        root.report("version", "nothing", "version = 1");
+    }
+    let version = root.optional_integer("version", 1..=1);
+    let size = read_size(root);
+    let camera = root.required_table("camera").and_then(|table| read_camera(&table, size));
+    let bed = root.required_table("bed").and_then(|table| read_bed(&table));
+    let quality = root.table("quality").map(|table| table.number("reprojection_rms_px", RMS_PX));
+    let (bed, robot_z) = bed?;
+    version?;
+    Some(Calibration::Full {
+        image_size_px: size?,
+        camera: camera?,
+        bed,
+        robot_z,
+        quality: match quality {
+            Some(rms) => Some(Quality { reprojection_rms_px: rms? }),
+            None => None,
+        },
+    })
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "checked to be a whole number in range"
+)]
+fn read_size(root: &Table<'_>) -> Option<[u32; 2]> {
+    let size = root.numbers::<2>("image_size_px", 1.0..=MAX_SIDE_PX)?;
+    if size.iter().any(|side| side.fract() != 0.0) {
+        let [width, height] = size;
+        root.report("image_size_px", format!("[{width}, {height}]"), "whole numbers of pixels");
+        return None;
+    }
+    Some(size.map(|side| side as u32))
+}
+
+fn read_camera(table: &Table<'_>, size: Option<[u32; 2]>) -> Option<Camera> {
+    let focal = (table.number("fx_px", FOCAL_PX), table.number("fy_px", FOCAL_PX));
+    let centre = (table.number("cx_px", CENTRE_PX), table.number("cy_px", CENTRE_PX));
+    let distortion = table.numbers::<5>("distortion", DISTORTION);
+    let camera = Camera {
+        focal_px: [focal.0?, focal.1?],
+        centre_px: [centre.0?, centre.1?],
+        distortion: distortion?,
+    };
+    if let Some(px) = size.and_then(|size| first_pixel_without_ray(&camera, size)) {
+        let found = format!("a lens whose picture folds over before pixel ({}, {})", px.x, px.y);
+        table.report("distortion", found, "one that can be undone in the whole picture");
+        return None;
+    }
+    Some(camera)
+}
+
+/// A corner of the picture or the middle of a side that the distortion
+/// polynomial does not reach.
+fn first_pixel_without_ray(camera: &Camera, size: [u32; 2]) -> Option<Point2<f64>> {
+    let [right, bottom] = size.map(|side| f64::from(side) - 1.0);
+    let xs = [0.0, right / 2.0, right];
+    let ys = [0.0, bottom / 2.0, bottom];
+    ys.iter()
+        .flat_map(|&y| xs.iter().map(move |&x| Point2::new(x, y)))
+        .find(|&px| camera.ray(px).is_none())
+}
+
+fn read_bed(table: &Table<'_>) -> Option<(Pose, Mm)> {
+    let rotation = table.numbers::<3>("rotation_rad", TURN_RAD);
+    let translation = table.numbers::<3>("translation_mm", LENGTH_MM);
+    let robot_z = table.number("robot_z_mm", LENGTH_MM);
+    let bed = Pose::new(Vector3::from(rotation?), Vector3::from(translation?));
+    let camera_height = bed.apply_inverse(Point3::origin()).z;
+    if camera_height <= 0.0 {
+        let found = format!("a camera {:.1} mm below the bed", -camera_height);
+        table.report("rotation_rad", found, "Z of the bed pointing from the bed at the camera");
+        return None;
+    }
+    Some((bed, Mm::new(robot_z?).ok()?))
+}
+
+/// A camera model and bed plane as the text of a calibration file; each note
+/// becomes a comment at its head. Numbers keep every digit.
+pub fn to_toml(
+    (camera, bed): (&Camera, &Pose),
+    image_size_px: [u32; 2],
+    robot_z: Mm,
+    quality: Option<Quality>,
+    notes: &[String],
+) -> String {
+    let mut text = String::new();
+    for line in notes.iter().flat_map(|note| note.lines()) {
+        let _ = writeln!(text, "# {line}");
+    }
+    let [fx, fy] = camera.focal_px;
+    let [cx, cy] = camera.centre_px;
+    let rotation: [f64; 3] = bed.rotation_rad().into();
+    let translation: [f64; 3] = bed.translation_mm().into();
+    let _ = write!(
+        text,
+        "version = 1\n\
+         image_size_px = {image_size_px:?}\n\
+         \n\
+         [camera]                    # pinhole, then Brown-Conrady in OpenCV's order\n\
+         fx_px = {fx:?}\n\
+         fy_px = {fy:?}\n\
+         cx_px = {cx:?}              # pixel (0,0) is the centre of the top-left pixel\n\
+         cy_px = {cy:?}\n\
+         distortion = {:?}           # k1 k2 p1 p2 k3\n\
+         \n\
+         [bed]                       # p_camera = R(rotation) * p_bed + translation\n\
+         rotation_rad = {rotation:?} # Rodrigues vector; Z of the bed points at the camera\n\
+         translation_mm = {translation:?}\n\
+         robot_z_mm = {:?}           # the robot's z when the image that fixed the plane was taken\n",
+        camera.distortion,
+        robot_z.get(),
+    );
+    if let Some(quality) = quality {
+        let rms = quality.reprojection_rms_px;
+        let _ = write!(text, "\n[quality]\nreprojection_rms_px = {rms:?}\n");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EXAMPLE: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/calib/example.toml"));
+
+    fn said(text: &str) -> String {
+        parse("calib.toml", text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn the_example_is_a_camera_that_looks_straight_down() {
+        let calibration = parse("calib/example.toml", EXAMPLE).unwrap();
+        let map = calibration.surface(Mm::ZERO, None);
+        let left = map.to_mm(Point2::new(300.0, 200.0)).unwrap();
+        let right = map.to_mm(Point2::new(400.0, 200.0)).unwrap();
+        assert!(((right - left).norm() - 16.0).abs() < 1e-9);
+        assert_eq!(calibration.image_size_px(), Some([720, 540]));
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_to_the_last_digit() {
+        let camera = Camera {
+            focal_px: [532.833_401_234_567_8, 1e-7 + 533.0],
+            centre_px: [342.512_345, -1e-5],
+            distortion: [-0.28, 0.03, 1.2e-3, -1e-5, 0.1],
+        };
+        let bed = Pose::new(Vector3::new(3.0, 0.1, -0.2), Vector3::new(1.5, -2.25, 400.125));
+        let quality = Some(Quality { reprojection_rms_px: 0.1234 });
+        let notes = ["made by hand\nfor a test".to_string()];
+        let text = to_toml((&camera, &bed), [640, 480], Mm::constant(12.5), quality, &notes);
+        let Calibration::Full { image_size_px, camera: c, bed: b, robot_z, quality: q } =
+            parse("x", &text).unwrap()
+        else {
+            unreachable!()
+        };
+        assert!(text.starts_with("# made by hand\n# for a test\nversion = 1\n"));
+        assert_eq!((image_size_px, c, robot_z.get(), q), ([640, 480], camera, 12.5, quality));
+        assert_eq!(b.translation_mm(), bed.translation_mm());
+        assert!((b.rotation_rad() - bed.rotation_rad()).norm() < 1e-14);
+    }
+
+    #[test]
+    fn everything_that_is_wrong_is_reported_at_once() {
+        let text = EXAMPLE
+            .replace("version = 1", "version = 2")
+            .replace("[720, 540]", "[720.5, 540]")
+            .replace("fx_px = 2500.0", "fx_px = nan")
+            .replace("cx_px", "cx")
+            .replace("[0.0, 0.0, 400.0]", "[0.0, 0.0, inf]");
+        let said = said(&text);
+        for line in [
+            "version: found 2",
+            "image_size_px: found [720.5, 540], expected whole numbers",
+            "camera.fx_px: found nan",
+            "camera.cx_px: found nothing",
+            "camera.cx: found an unknown key",
+            "bed.translation_mm: found [0.0, 0.0, inf]",
+        ] {
+            assert!(said.contains(line), "no \"{line}\" in\n{said}");
+        }
+    }
+
+    #[test]
+    fn a_bed_that_looks_away_and_a_lens_that_folds_are_refused() {
+        let away = EXAMPLE.replace("[3.141592653589793, 0.0, 0.0]", "[0.0, 0.0, 0.0]");
+        assert!(said(&away).contains("bed.rotation_rad: found a camera 400.0 mm below the bed"));
+        let folded = EXAMPLE.replace("distortion = [0.0,", "distortion = [-40.0,");
+        assert!(said(&folded).contains("camera.distortion: found a lens whose picture folds over"));
+        assert!(said("").contains("expected a table [camera]"));
+    }
+}

@@ -2,8 +2,8 @@
 
 use nalgebra::Point3;
 
-use super::board::{Board, NotABoard};
 use super::Camera;
+use super::board::{Board, NotABoard};
 use crate::bridge::{self, BoardView, BridgeError};
 use crate::frame::Frame;
 use crate::geometry::{ImagePoint, Pose};
@@ -117,8 +117,8 @@ pub struct Solution {
 /// Looks for the board in a picture.
 pub fn look(board: &Board, name: &str, frame: &Frame) -> Result<Sighting, Refusal> {
     let (columns, rows) = board.corners();
-    let corners = bridge::find_board(frame, (columns, rows))?
-        .ok_or(Refusal::NoBoard { columns, rows })?;
+    let corners =
+        bridge::find_board(frame, (columns, rows))?.ok_or(Refusal::NoBoard { columns, rows })?;
     let side = |px: usize| u32::try_from(px).unwrap_or(u32::MAX);
     Ok(Sighting {
         name: name.to_owned(),

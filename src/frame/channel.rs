@@ -155,9 +155,12 @@ mod tests {
     #[test]
     fn each_channel_is_found_in_each_order() {
         let (rgba, bgr) = ([10_u16, 2000, 30000, 7], [30000_u16, 2000, 10]);
-        for (channel, value) in
-            [(Channel::Red, 10), (Channel::Green, 2000), (Channel::Blue, 30000), (Channel::Grey, 4596)]
-        {
+        for (channel, value) in [
+            (Channel::Red, 10),
+            (Channel::Green, 2000),
+            (Channel::Blue, 30000),
+            (Channel::Grey, 4596),
+        ] {
             assert_eq!(channel.extract(&rgba, Layout::Rgba), vec![value]);
             assert_eq!(channel.extract(&bgr, Layout::Bgr), vec![value]);
         }

@@ -72,7 +72,8 @@ pub struct EncodeError {
 /// Whether a file's name ends like an image's, in either case.
 pub fn has_image_extension(path: &Path) -> bool {
     let extension = path.extension().and_then(|ending| ending.to_str());
-    extension.is_some_and(|ending| EXTENSIONS.iter().any(|known| known.eq_ignore_ascii_case(ending)))
+    extension
+        .is_some_and(|ending| EXTENSIONS.iter().any(|known| known.eq_ignore_ascii_case(ending)))
 }
 
 /// Reads an image file. Values stay as they are stored: 10 or 12 bits in a
@@ -147,8 +148,7 @@ pub fn encode_png(frame: &Frame) -> Result<Vec<u8>, EncodeError> {
     };
     let image = image.ok_or_else(|| failed("its pixels do not fill it".to_owned()))?;
     let mut bytes = Vec::new();
-    let encoder =
-        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub);
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub);
     image.write_with_encoder(encoder).map_err(|error| failed(error.to_string()))?;
     Ok(bytes)
 }
@@ -171,14 +171,16 @@ mod tests {
     #[test]
     fn grey_images_of_both_depths_keep_their_values() {
         let deep: Vec<u16> = vec![0, 1, 1023, 4095, 40000, 65535];
-        let deep_image = DynamicImage::ImageLuma16(ImageBuffer::from_raw(3, 2, deep.clone()).unwrap());
+        let deep_image =
+            DynamicImage::ImageLuma16(ImageBuffer::from_raw(3, 2, deep.clone()).unwrap());
         for format in [ImageFormat::Png, ImageFormat::Tiff, ImageFormat::Pnm] {
             let frame = decoded(&bytes_of(&deep_image, format), Channel::Red);
             assert_eq!((frame.size(), frame.seq, frame.captured_at.ns()), ((3, 2), 3, 9));
             assert_eq!(frame.pixels(), &Pixels::Grey16(deep.clone()), "{format:?}");
         }
         let flat: Vec<u8> = vec![0, 1, 127, 128, 254, 255];
-        let flat_image = DynamicImage::ImageLuma8(ImageBuffer::from_raw(3, 2, flat.clone()).unwrap());
+        let flat_image =
+            DynamicImage::ImageLuma8(ImageBuffer::from_raw(3, 2, flat.clone()).unwrap());
         for format in [ImageFormat::Png, ImageFormat::Tiff, ImageFormat::Pnm, ImageFormat::Bmp] {
             let frame = decoded(&bytes_of(&flat_image, format), Channel::Grey);
             assert_eq!(frame.pixels(), &Pixels::Grey8(flat.clone()), "{format:?}");
@@ -212,7 +214,9 @@ mod tests {
 
     #[test]
     fn a_frame_survives_as_png() {
-        for pixels in [Pixels::Grey8(vec![0, 7, 200, 255]), Pixels::Grey16(vec![0, 300, 4095, 65535])] {
+        for pixels in
+            [Pixels::Grey8(vec![0, 7, 200, 255]), Pixels::Grey16(vec![0, 300, 4095, 65535])]
+        {
             let frame = Frame::new(3, Stamp::from_ns(9), (2, 2), pixels).unwrap();
             assert_eq!(decoded(&encode_png(&frame).unwrap(), Channel::Grey), frame);
         }

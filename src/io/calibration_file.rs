@@ -1,0 +1,44 @@
+//! Reads a calibration file from the disk.
+
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use crate::calib::{Calibration, file};
+use crate::config::Problems;
+
+/// A calibration file that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrationFileError {
+    /// It cannot be read.
+    #[error("calibration file {}: {source}; `truebead calibrate` makes one", path.display())]
+    Read {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// What stands in it is wrong.
+    #[error(transparent)]
+    Content(#[from] Problems),
+}
+
+/// Reads a calibration file; everything that is wrong with it is reported at
+/// once.
+pub fn read(path: &Path) -> Result<Calibration, CalibrationFileError> {
+    let text = fs::read_to_string(path)
+        .map_err(|source| CalibrationFileError::Read { path: path.to_owned(), source })?;
+    Ok(file::parse(&path.display().to_string(), &text)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shipped_example_is_sound_and_a_missing_file_says_what_makes_one() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("calib");
+        assert!(read(&folder.join("example.toml")).is_ok());
+        let said = read(&folder.join("none.toml")).unwrap_err().to_string();
+        assert!(said.contains("none.toml") && said.contains("truebead calibrate"), "{said}");
+    }
+}
