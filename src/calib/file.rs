@@ -132,17 +132,17 @@ pub fn to_toml(
         "version = 1\n\
          image_size_px = {image_size_px:?}\n\
          \n\
-         [camera]                    # pinhole, then Brown-Conrady in OpenCV's order\n\
+         [camera] # pinhole, then Brown-Conrady in OpenCV's order\n\
          fx_px = {fx:?}\n\
          fy_px = {fy:?}\n\
-         cx_px = {cx:?}              # pixel (0,0) is the centre of the top-left pixel\n\
+         cx_px = {cx:?} # pixel (0,0) is the centre of the top-left pixel\n\
          cy_px = {cy:?}\n\
-         distortion = {:?}           # k1 k2 p1 p2 k3\n\
+         distortion = {:?} # k1 k2 p1 p2 k3\n\
          \n\
-         [bed]                       # p_camera = R(rotation) * p_bed + translation\n\
+         [bed] # p_camera = R(rotation) * p_bed + translation\n\
          rotation_rad = {rotation:?} # Rodrigues vector; Z of the bed points at the camera\n\
          translation_mm = {translation:?}\n\
-         robot_z_mm = {:?}           # the robot's z when the image that fixed the plane was taken\n",
+         robot_z_mm = {:?} # the robot's z when the image that fixed the plane was taken\n",
         camera.distortion,
         robot_z.get(),
     );

@@ -201,3 +201,127 @@ fn root_mean_square(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     let count = values.len().max(1) as f64;
     (values.map(|v| v * v).sum::<f64>() / count).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calib::Calibration;
+    use crate::calib::plane::bed_from_board;
+    use crate::units::Mm;
+    use nalgebra::{Point2, Vector3};
+    use rand::{RngExt, SeedableRng};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    const TRUTH: Camera = Camera {
+        focal_px: [1210.0, 1215.0],
+        centre_px: [352.0, 263.0],
+        distortion: [-0.22, 0.11, 8e-4, -5e-4, 0.0],
+    };
+    const SIZE: [u32; 2] = [720, 540];
+
+    fn board() -> Board {
+        Board::new(9, 6, Mm::constant(20.0)).unwrap()
+    }
+
+    /// A dozen poses of the board around the picture, tilted to all sides.
+    fn poses() -> Vec<Pose> {
+        (0..12_u32)
+            .map(|i| {
+                let turn = f64::from(i) * 0.55;
+                let tilt = 0.15 + 0.04 * f64::from(i);
+                let rotation = Vector3::new(tilt * turn.cos(), tilt * turn.sin(), 0.1 * turn);
+                let place =
+                    Vector3::new(-80.0 + 25.0 * turn.cos(), -50.0 + 18.0 * turn.sin(), 420.0);
+                Pose::new(rotation, place)
+            })
+            .collect()
+    }
+
+    /// What the true camera sees, off by up to `noise_px` in each direction.
+    fn sightings(noise_px: f64) -> Vec<Sighting> {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
+        let mut off =
+            || if noise_px > 0.0 { random.random_range(-noise_px..noise_px) } else { 0.0 };
+        poses()
+            .iter()
+            .enumerate()
+            .map(|(i, pose)| {
+                let seen = |p: &Point3<f64>| TRUTH.project(pose.apply(*p)).unwrap();
+                let corners = board().corners_mm();
+                let moved = corners.iter().map(seen).map(|p| Point2::new(p.x + off(), p.y + off()));
+                Sighting { name: i.to_string(), image_size_px: SIZE, corners_px: moved.collect() }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn exact_corners_give_the_true_camera_and_poses() {
+        let solution = solve(&board(), &sightings(0.0)).unwrap();
+        // OpenCV takes corners in single precision, which is 3e-5 px here.
+        assert!(solution.rms_px < 1e-4, "rms {}", solution.rms_px);
+        assert!((solution.camera.focal_px[0] - 1210.0).abs() < 0.02, "{:?}", solution.camera);
+        assert!((solution.camera.centre_px[1] - 263.0).abs() < 0.02, "{:?}", solution.camera);
+        for (view, truth) in solution.views.iter().zip(poses()) {
+            assert!((view.pose.translation_mm() - truth.translation_mm()).norm() < 0.02);
+            assert!(view.max_px < 1e-3);
+        }
+    }
+
+    #[test]
+    fn the_error_and_the_standard_deviations_are_those_of_the_noise() {
+        let noise_px = 0.2;
+        let solution = solve(&board(), &sightings(noise_px)).unwrap();
+        // Uniform noise in x and y: a distance of RMS sqrt(2/3) of its half width.
+        let expected = noise_px * (2.0_f64 / 3.0).sqrt();
+        assert!((solution.rms_px / expected - 1.0).abs() < 0.1, "rms {}", solution.rms_px);
+        let miss = (solution.camera.focal_px[0] - 1210.0).abs() / solution.sigma[0];
+        assert!(miss < 3.0, "fx is off by {miss} standard deviations");
+    }
+
+    #[test]
+    fn a_width_is_right_at_any_height_with_the_full_calibration() {
+        let solution = solve(&board(), &sightings(0.0)).unwrap();
+        let thickness = Mm::constant(4.0);
+        let bed = bed_from_board(&solution.views[2].pose, thickness);
+        let true_bed = bed_from_board(&poses()[2], thickness);
+        let calibration = Calibration::Full {
+            image_size_px: SIZE,
+            camera: solution.camera,
+            bed,
+            robot_z: Mm::ZERO,
+            quality: None,
+        };
+        for height in [0.0, 4.0, 20.0, 45.0] {
+            let map = calibration.surface(Mm::constant(height), None);
+            // A bead of 42 mm on the true bed, at this height.
+            let edge = |x: f64| {
+                let px = TRUTH.project(true_bed.apply(Point3::new(x, -40.0, height))).unwrap();
+                map.to_mm(px).unwrap()
+            };
+            let width = (edge(100.0) - edge(58.0)).norm();
+            assert!((width - 42.0).abs() < 0.005, "{width} mm at {height} mm");
+        }
+    }
+
+    #[test]
+    fn a_pose_alone_is_found_with_a_known_camera() {
+        let (view, truth) = (&sightings(0.0)[3], &poses()[3]);
+        let view = BoardView { board_mm: board().corners_mm(), image_px: view.corners_px.clone() };
+        let pose = bridge::solve_pose(&view, &TRUTH).unwrap();
+        assert!((pose.translation_mm() - truth.translation_mm()).norm() < 0.01);
+        assert!((pose.rotation_rad() - truth.rotation_rad()).norm() < 1e-4);
+    }
+
+    #[test]
+    fn pictures_of_another_size_are_refused_and_too_few_are_no_calibration() {
+        let mut odd = sightings(0.0);
+        odd[1].image_size_px = [540, 720];
+        let mut looks: Vec<_> = odd.into_iter().map(|s| (s.name.clone(), Ok(s))).collect();
+        agree_on_size(&mut looks);
+        let said = looks[1].1.as_ref().unwrap_err().to_string();
+        assert_eq!(said, "size 540x720 px, while most are 720x540 px");
+        assert_eq!(looks.iter().filter(|look| look.1.is_ok()).count(), 11);
+        let few = solve(&board(), &sightings(0.0)[..2]).unwrap_err();
+        assert_eq!(few, SolveError::TooFew { found: 2 });
+    }
+}

@@ -1,0 +1,89 @@
+//! `truebead calibrate` on real pictures of a board, and with bad input.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use nalgebra::Point2;
+use truebead::calib::Calibration;
+use truebead::io::calibration_file;
+use truebead::units::Mm;
+
+/// Thirteen pictures of a board with 9x6 inner corners, of squares of 25 mm, if
+/// they are there.
+fn chessboard() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/chessboard");
+    if !folder.is_dir() {
+        eprintln!("skipped: the pictures of the board are not at {}", folder.display());
+        return None;
+    }
+    Some(folder)
+}
+
+fn calibrate(input: &Path, out: &Path, more: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_truebead"));
+    command.arg("calibrate").arg(input).arg("--out").arg(out);
+    command.args(["--board", "9x6", "--square-mm", "25"]).args(more);
+    command
+}
+
+#[test]
+fn the_camera_of_the_real_pictures_is_found() {
+    let Some(folder) = chessboard() else { return };
+    let scratch = tempfile::tempdir().unwrap();
+    let out = scratch.path().join("calib.toml");
+    let run = calibrate(&folder, &out, &[]).assert().success();
+    let said = String::from_utf8_lossy(&run.get_output().stdout).into_owned();
+    assert!(said.contains("13 of 13 images show the board"), "{said}");
+    let calibration = calibration_file::read(&out).unwrap();
+    let Calibration::Full { camera, quality, .. } = &calibration else { unreachable!() };
+    assert!(quality.unwrap().reprojection_rms_px <= 0.20);
+    // The focal length that OpenCV's own samples give for these pictures.
+    assert!((camera.focal_px[0] - 532.83).abs() < 0.8, "fx {}", camera.focal_px[0]);
+    assert!((camera.centre_px[0] - 342.5).abs() < 1.5 && (camera.centre_px[1] - 233.9).abs() < 1.5);
+}
+
+#[test]
+fn the_squares_have_their_size_at_any_height_of_the_board() {
+    let Some(folder) = chessboard() else { return };
+    let scratch = tempfile::tempdir().unwrap();
+    let out = scratch.path().join("calib.toml");
+    calibrate(&folder, &out, &["--plane", "left04.jpg"]).assert().success();
+    let on_bed = calibration_file::read(&out).unwrap().surface(Mm::ZERO, None);
+    // A board that is 8 mm thick lies on a bed that is 8 mm deeper: its face is
+    // the same plane, measured as a surface 8 mm above the bed.
+    let thick = ["--plane", "left04.jpg", "--board-thickness-mm", "8"];
+    calibrate(&folder, &out, &thick).assert().success();
+    let on_thick = calibration_file::read(&out).unwrap().surface(Mm::constant(8.0), None);
+    for (x, y) in [(100.0, 100.0), (320.0, 240.0), (500.0, 400.0)] {
+        let pair = [Point2::new(x, y), Point2::new(x + 60.0, y)];
+        let [a, b] = pair.map(|px| on_bed.to_mm(px).unwrap());
+        let [c, d] = pair.map(|px| on_thick.to_mm(px).unwrap());
+        assert!(((b - a).norm() - (d - c).norm()).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn wrong_arguments_end_with_2_and_leave_nothing() {
+    let scratch = tempfile::tempdir().unwrap();
+    let out = scratch.path().join("calib.toml");
+    calibrate(Path::new("no/such/folder"), &out, &[]).assert().code(2);
+    calibrate(scratch.path(), &out, &[]).assert().code(2);
+    calibrate(scratch.path(), &out, &["--robot-z-mm", "high"]).assert().code(2);
+    assert!(!out.exists());
+}
+
+#[test]
+fn pictures_without_a_board_end_with_1_and_say_which() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path().join("pictures");
+    fs::create_dir(&folder).unwrap();
+    image::GrayImage::new(64, 48).save(folder.join("black.png")).unwrap();
+    fs::write(folder.join("broken.png"), "no picture").unwrap();
+    let out = scratch.path().join("calib.toml");
+    let run = calibrate(&folder, &out, &[]).assert().code(1);
+    let said = String::from_utf8_lossy(&run.get_output().stdout).into_owned();
+    assert!(said.contains("black.png") && said.contains("no board with 9x6"), "{said}");
+    assert!(said.contains("broken.png") && said.contains("unreadable"), "{said}");
+    assert!(!out.exists());
+}
