@@ -26,6 +26,7 @@ pub mod controller;
 pub mod frame;
 pub mod geometry;
 pub mod io;
+pub mod link;
 pub mod ports;
 pub mod sim;
 pub mod time;

@@ -1,0 +1,240 @@
+//! The robot's side of the link as a state machine. Time is an argument; one
+//! machine serves `robot-sim`, the simulated cell and the tests.
+//!
+//! ```text
+//!            begin_bead             setpoint runs out           1 s more
+//!   IDLE ───────────────▶ PRINT ───────────────────────▶ HOLD ───────────▶ STOP
+//!    ▲                     │  ▲────── valid SPEED ────────┘                  ▲
+//!    │   end of the bead   │                                                │
+//!    ├─────────────────────┘   STOP line, from PRINT or HOLD ───────────────┘
+//!    └─────────────────────── acknowledge, from STOP or FAULT
+//! ```
+//!
+//! The link says that a bead begins at the robot's start speed until the first
+//! setpoint, but not what happens if none ever comes. Here the start of a bead
+//! counts as a setpoint at the start speed, valid for the longest time that a
+//! setpoint may be ([`MAX_VALID_MS`]): a PC that is dead, or connected and
+//! mute, then leads to `HOLD` and `STOP` like one that falls silent later.
+
+use super::motion::{Drive, Motion, seconds};
+use super::{ErrCode, MAX_VALID_MS, ParamError, RobotLine, RobotParams};
+use crate::control::{RobotLimits, RobotMode, RobotState};
+use crate::time::{Span, Stamp};
+use crate::units::{Mm, MmPerS};
+
+mod take;
+#[cfg(test)]
+mod tests;
+
+const NS_PER_MS: u64 = 1_000_000;
+/// How long it holds before it stops.
+const HOLD_TO_STOP: Span = Span::from_millis(1000);
+/// How long the start speed is valid without a setpoint.
+const START_VALID: Span = Span::from_millis(MAX_VALID_MS.cast_signed());
+
+/// What the robot does, with what belongs to it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Doing {
+    Idle,
+    Print { target: MmPerS, until: Stamp },
+    Hold { until: Stamp },
+    Stop,
+    Fault,
+}
+
+/// Ways in which a robot can misbehave, for tests and rehearsals.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Faults {
+    /// Refuses every setpoint with this.
+    pub refuse: Option<ErrCode>,
+    /// Sends no `STATE`.
+    pub mute: bool,
+    /// Moves at this share of the speed that it was told; 1 is none the worse.
+    pub follows: f64,
+}
+
+impl Default for Faults {
+    fn default() -> Self {
+        Self { refuse: None, mute: false, follows: 1.0 }
+    }
+}
+
+/// A robot that speaks the link.
+#[derive(Debug, Clone)]
+pub struct RobotCell {
+    params: RobotParams,
+    at: Stamp,
+    doing: Doing,
+    motion: Motion,
+    bead_end: Option<f64>,
+    z: Mm,
+    greeted: bool,
+    expected_seq: u64,
+    applied_seq: u64,
+    faults: Faults,
+}
+
+impl RobotCell {
+    /// A robot that stands idle at `now`; fails on parameters that cannot be.
+    pub fn new(params: RobotParams, now: Stamp) -> Result<Self, ParamError> {
+        let params = params.checked()?;
+        Ok(Self {
+            at: now,
+            doing: Doing::Idle,
+            motion: Motion::default(),
+            bead_end: None,
+            z: params.z,
+            greeted: false,
+            expected_seq: 1,
+            applied_seq: 0,
+            faults: Faults::default(),
+            params,
+        })
+    }
+
+    /// A connection, which replaces an older one. The count begins again; the
+    /// last setpoint keeps running.
+    pub fn connect(&mut self, now: Stamp) {
+        self.disconnect(now);
+        self.expected_seq = 1;
+        self.applied_seq = 0;
+    }
+
+    /// The connection is gone. The last setpoint runs out.
+    pub fn disconnect(&mut self, now: Stamp) {
+        self.advance(now);
+        self.greeted = false;
+    }
+
+    /// Whether a PC is connected and has said `HELLO`.
+    pub fn greeted(&self) -> bool {
+        self.greeted
+    }
+
+    /// What it does.
+    pub fn mode(&self) -> RobotMode {
+        match self.doing {
+            Doing::Idle => RobotMode::Idle,
+            Doing::Print { .. } => RobotMode::Print,
+            Doing::Hold { .. } => RobotMode::Hold,
+            Doing::Stop => RobotMode::Stop,
+            Doing::Fault => RobotMode::Fault,
+        }
+    }
+
+    /// What it says of itself.
+    pub fn limits(&self) -> RobotLimits {
+        self.params.limits()
+    }
+
+    /// Begins a bead at a height, out of `IDLE` only; says whether it did.
+    pub fn begin_bead(&mut self, now: Stamp, z: Mm) -> bool {
+        self.advance(now);
+        if self.doing != Doing::Idle {
+            return false;
+        }
+        self.z = z;
+        self.bead_end = self.params.bead.map(|length| self.motion.path + length.get());
+        self.doing = Doing::Print { target: self.params.start, until: self.at + START_VALID };
+        true
+    }
+
+    /// What an operator does at the robot: leaves `STOP` or `FAULT` for `IDLE`.
+    pub fn acknowledge(&mut self, now: Stamp) {
+        self.advance(now);
+        if matches!(self.doing, Doing::Stop | Doing::Fault) {
+            self.doing = Doing::Idle;
+        }
+    }
+
+    /// Makes it stop with a fault of its own.
+    pub fn fail(&mut self, now: Stamp) {
+        self.advance(now);
+        self.doing = Doing::Fault;
+    }
+
+    /// Makes it misbehave from now on.
+    pub fn set_faults(&mut self, now: Stamp, faults: Faults) {
+        self.advance(now);
+        self.faults = faults;
+    }
+
+    /// Moves on to `now`; a time that has passed already changes nothing.
+    pub fn advance(&mut self, now: Stamp) {
+        while self.at < now || self.due() {
+            let to = self.deadline().map_or(now, |deadline| deadline.min(now)).max(self.at);
+            if self.move_until(to) {
+                self.doing = Doing::Idle;
+            } else if self.due() {
+                self.doing = match self.doing {
+                    Doing::Print { until, .. } => Doing::Hold { until: until + HOLD_TO_STOP },
+                    _ => Doing::Stop,
+                };
+            }
+        }
+    }
+
+    /// Its true state.
+    pub fn state(&mut self, now: Stamp) -> RobotState {
+        self.advance(now);
+        let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
+        RobotState {
+            t_ms: self.clock_ms(),
+            seq: self.applied_seq,
+            mode: self.mode(),
+            speed_mm_per_s: MmPerS::new(finite(self.motion.speed)).unwrap_or_default(),
+            path_mm: Mm::new(finite(self.motion.path)).unwrap_or_default(),
+            z_mm: self.z,
+        }
+    }
+
+    /// The `STATE` to send; none while it is mute.
+    pub fn report(&mut self, now: Stamp) -> Option<RobotLine> {
+        let state = self.state(now);
+        (!self.faults.mute).then_some(RobotLine::State(state))
+    }
+
+    /// Runs the motion to `to`, or to the end of the bead if that comes first;
+    /// says whether it did.
+    fn move_until(&mut self, to: Stamp) -> bool {
+        let drive = self.drive();
+        let within_ns = to.ns().saturating_sub(self.at.ns());
+        let printing = matches!(self.doing, Doing::Print { .. } | Doing::Hold { .. });
+        let end = self.bead_end.filter(|_| printing);
+        let end_ns = end.and_then(|end| self.motion.reaches(drive, end, within_ns));
+        let ns = end_ns.unwrap_or(within_ns);
+        self.motion = self.motion.after(drive, seconds(ns));
+        self.at = Stamp::from_ns(self.at.ns().saturating_add(ns));
+        end_ns.is_some()
+    }
+
+    fn drive(&self) -> Drive {
+        let target = match self.doing {
+            Doing::Print { target, .. } => target.get(),
+            Doing::Hold { .. } => self.params.hold.get(),
+            Doing::Idle | Doing::Stop | Doing::Fault => 0.0,
+        };
+        let lag_s = 1.0 / (2.0 * std::f64::consts::PI * self.params.bandwidth_hz);
+        Drive { target: target * self.faults.follows, lag_s, accel: self.params.accel.get() }
+    }
+
+    fn deadline(&self) -> Option<Stamp> {
+        match self.doing {
+            Doing::Print { until, .. } | Doing::Hold { until } => Some(until),
+            Doing::Idle | Doing::Stop | Doing::Fault => None,
+        }
+    }
+
+    fn due(&self) -> bool {
+        self.deadline().is_some_and(|deadline| deadline <= self.at)
+    }
+
+    fn clock_ms(&self) -> u64 {
+        self.params.clock_start_ms.saturating_add(self.at.ns() / NS_PER_MS)
+    }
+
+    fn stamp_of(&self, t_ms: u64) -> Stamp {
+        let since_start_ms = t_ms.saturating_sub(self.params.clock_start_ms);
+        Stamp::from_ns(since_start_ms.saturating_mul(NS_PER_MS))
+    }
+}

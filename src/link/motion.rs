@@ -1,0 +1,140 @@
+//! How a robot's speed follows its target: a first-order lag whose slope is
+//! limited, solved in closed form, so that it does not matter how often the
+//! motion is looked at.
+
+/// What drives the motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drive {
+    /// Speed to go to \[mm/s\].
+    pub target: f64,
+    /// Time constant of the velocity loop, 1/(2π·bandwidth) \[s\].
+    pub lag_s: f64,
+    /// Largest slope of the speed \[mm/s²\].
+    pub accel: f64,
+}
+
+/// Speed and path at one moment.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Motion {
+    /// Speed along the path \[mm/s\].
+    pub speed: f64,
+    /// Distance along the path \[mm\].
+    pub path: f64,
+}
+
+impl Motion {
+    /// The motion `dt_s` seconds later under a constant drive: with
+    /// e = target − v, dv/dt = clamp(e/τ, ±a). A ramp while |e| > a·τ, then
+    /// v = target − e·exp(−t/τ).
+    #[must_use]
+    pub fn after(self, drive: Drive, dt_s: f64) -> Self {
+        let Drive { target, lag_s, accel } = drive;
+        let missing = target - self.speed;
+        let ramp_s = ((missing.abs() - accel * lag_s) / accel).clamp(0.0, dt_s);
+        let slope = accel.copysign(missing);
+        let ramped = Self {
+            speed: self.speed + slope * ramp_s,
+            path: self.path + forward(self.speed * ramp_s + 0.5 * slope * ramp_s * ramp_s),
+        };
+        let rest_s = dt_s - ramp_s;
+        let missing = target - ramped.speed;
+        let settled = -(-rest_s / lag_s).exp_m1();
+        Self {
+            speed: ramped.speed + missing * settled,
+            path: ramped.path + forward(target * rest_s - missing * lag_s * settled),
+        }
+    }
+
+    /// How many nanoseconds of `within_ns` pass until the path has reached
+    /// `path_mm`, rounded up; none if it is not reached by then.
+    pub fn reaches(self, drive: Drive, path_mm: f64, within_ns: u64) -> Option<u64> {
+        let there = |ns: u64| self.after(drive, seconds(ns)).path >= path_mm;
+        if !there(within_ns) {
+            return None;
+        }
+        let (mut before, mut reached) = (0, within_ns);
+        while before < reached {
+            let middle = before + (reached - before) / 2;
+            if there(middle) {
+                reached = middle;
+            } else {
+                before = middle + 1;
+            }
+        }
+        Some(reached)
+    }
+}
+
+/// Rounding must not let a path fall.
+fn forward(step_mm: f64) -> f64 {
+    step_mm.max(0.0)
+}
+
+/// Nanoseconds as seconds.
+#[expect(clippy::cast_precision_loss, reason = "exact for spans under 104 days")]
+pub(super) fn seconds(ns: u64) -> f64 {
+    ns as f64 / 1e9
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const LAG_S: f64 = 1.0 / (2.0 * std::f64::consts::PI * 10.0);
+
+    #[test]
+    fn one_time_constant_covers_63_percent() {
+        let drive = Drive { target: 100.0, lag_s: LAG_S, accel: 1e9 };
+        let motion = Motion::default().after(drive, LAG_S);
+        assert!((motion.speed - 100.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-9);
+        // ∫ u(1 − e^(−t/τ)) dt over one τ is u·τ/e.
+        assert!((motion.path - 100.0 * LAG_S * (-1.0_f64).exp()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_slope_is_limited_until_the_lag_takes_over() {
+        let drive = Drive { target: 100.0, lag_s: LAG_S, accel: 500.0 };
+        let early = Motion::default().after(drive, 0.1);
+        assert!((early.speed - 50.0).abs() < 1e-9);
+        assert!((early.path - 2.5).abs() < 1e-9);
+        assert!((Motion::default().after(drive, 2.0).speed - 100.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_place_on_the_path_is_found_to_the_nanosecond() {
+        let drive = Drive { target: 100.0, lag_s: LAG_S, accel: 2000.0 };
+        let steady = Motion { speed: 100.0, path: 0.0 };
+        assert_eq!(steady.reaches(drive, 10.0, 200_000_000), Some(100_000_000));
+        assert_eq!(steady.reaches(drive, 10.0, 99_000_000), None);
+        assert_eq!(steady.reaches(drive, 0.0, 5), Some(0));
+    }
+
+    proptest! {
+        #[test]
+        fn it_does_not_matter_how_often_one_looks(
+            speed in 0.0..200.0_f64,
+            target in 0.0..200.0_f64,
+            accel in 50.0..5000.0_f64,
+            total_s in 0.0..1.0_f64,
+            cuts in prop::collection::vec(0.0..1.0_f64, 0..20),
+        ) {
+            let drive = Drive { target, lag_s: LAG_S, accel };
+            let start = Motion { speed, path: 7.0 };
+            let whole = start.after(drive, total_s);
+            let mut cuts = cuts;
+            cuts.push(1.0);
+            cuts.sort_by(f64::total_cmp);
+            let (mut motion, mut at) = (start, 0.0);
+            for cut in cuts {
+                let next = motion.after(drive, (cut - at) * total_s);
+                prop_assert!(next.path >= motion.path);
+                prop_assert!(next.speed >= -1e-9);
+                (motion, at) = (next, cut);
+            }
+            prop_assert!((motion.speed - whole.speed).abs() < 1e-6);
+            prop_assert!((motion.path - whole.path).abs() < 1e-6);
+        }
+    }
+}
