@@ -4,4 +4,6 @@ pub mod calibration_file;
 pub mod camera;
 pub mod clock;
 pub mod image_file;
+pub mod robot;
+pub mod robot_sim;
 pub mod whole_file;

@@ -1,25 +1,54 @@
-//! The run's clock, the only one that is read while a bead is laid.
+//! The one clock of a run.
 
-use std::time::Instant;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use crate::time::Stamp;
 
-/// Counts from the start of the run. Copies show the same time.
+/// Counts from the start of the run, and knows the wall-clock time of that
+/// moment. Copies agree with each other.
 #[derive(Debug, Clone, Copy)]
 pub struct RunClock {
-    start: Instant,
+    began: Instant,
+    epoch: SystemTime,
 }
 
 impl RunClock {
-    /// Starts counting now.
-    #[expect(clippy::disallowed_methods, reason = "this is the run's clock")]
+    /// The run begins now.
+    #[expect(clippy::disallowed_methods, reason = "this is the clock that others are given")]
     pub fn start() -> Self {
-        Self { start: Instant::now() }
+        Self { began: Instant::now(), epoch: SystemTime::now() }
     }
 
-    /// The moment it is.
+    /// Time since the run began; never falls.
     pub fn now(&self) -> Stamp {
-        let ns = self.start.elapsed().as_nanos();
+        let ns = self.began.elapsed().as_nanos();
         Stamp::from_ns(u64::try_from(ns).unwrap_or(u64::MAX))
+    }
+
+    /// Wall-clock time at the start of the run. The wall clock may be set while
+    /// a run is under way; stamps do not follow it.
+    pub fn epoch(&self) -> SystemTime {
+        self.epoch
+    }
+
+    /// Wall-clock time at the start of the run \[ns since 1970-01-01 UTC\]; 0 on
+    /// a machine whose clock stands before that.
+    pub fn epoch_unix_ns(&self) -> u64 {
+        let since = self.epoch.duration_since(UNIX_EPOCH).unwrap_or_default();
+        u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn copies_agree_and_time_does_not_fall() {
+        let clock = RunClock::start();
+        let copy = clock;
+        let (a, b, c) = (clock.now(), copy.now(), clock.now());
+        assert!(a <= b && b <= c);
+        assert!(clock.epoch_unix_ns() > 1_600_000_000_000_000_000);
     }
 }

@@ -1,0 +1,64 @@
+//! One connection of the simulated robot.
+
+use std::io::{Read, Write};
+use std::net::{Shutdown, SocketAddr, TcpStream};
+use std::thread::Builder;
+use std::time::Duration;
+
+use crossbeam_channel::Sender;
+
+use super::robot::Input;
+use crate::link::{BadLines, LineSplitter, RobotLine};
+
+/// A PC that takes no bytes for this long is let go.
+const WRITE: Duration = Duration::from_millis(100);
+
+/// The PC at the other end.
+pub(super) struct Peer {
+    pub(super) id: u64,
+    pub(super) address: SocketAddr,
+    pub(super) splitter: LineSplitter,
+    pub(super) bad: BadLines,
+    stream: TcpStream,
+}
+
+impl Peer {
+    /// Starts to read; bytes and the end arrive among `inputs` under `id`.
+    pub(super) fn new(stream: TcpStream, id: u64, inputs: Sender<Input>) -> std::io::Result<Self> {
+        stream.set_nodelay(true)?;
+        stream.set_write_timeout(Some(WRITE))?;
+        let address = stream.peer_addr()?;
+        let reading = stream.try_clone()?;
+        let thread = Builder::new().name("robot-sim-read".to_owned());
+        thread.spawn(move || read_all(reading, id, &inputs))?;
+        let (splitter, bad) = (LineSplitter::new(), BadLines::default());
+        Ok(Self { id, address, splitter, bad, stream })
+    }
+
+    /// Writes a line whole; an error means that the PC must be let go.
+    pub(super) fn say(&mut self, line: &RobotLine) -> std::io::Result<()> {
+        self.stream.write_all(line.format().as_bytes())
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        // Ends the reading thread; a connection that is gone cannot be shut.
+        let _ = self.stream.shutdown(Shutdown::Both);
+    }
+}
+
+fn read_all(mut stream: TcpStream, id: u64, inputs: &Sender<Input>) {
+    let mut bytes = [0; 4096];
+    loop {
+        let input = match stream.read(&mut bytes) {
+            Ok(count) if count > 0 => Input::Bytes(id, bytes[..count].to_vec()),
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
+            _ => Input::Gone(id),
+        };
+        let last = matches!(input, Input::Gone(_));
+        if inputs.send(input).is_err() || last {
+            return;
+        }
+    }
+}
