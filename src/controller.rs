@@ -364,3 +364,5 @@ impl Trace {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub use tests::setup as example_setup;

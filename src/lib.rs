@@ -28,6 +28,7 @@ pub mod geometry;
 pub mod io;
 pub mod link;
 pub mod ports;
+pub mod runner;
 pub mod sim;
 pub mod time;
 pub mod units;

@@ -10,10 +10,14 @@
 //! outlier edges that disagree with their neighbours
 //! axis    edges → width normal to the bead, on the surface
 //! ```
+//!
+//! [`Method::EdgeLines`] is the method of the 2022 paper instead, as a
+//! baseline.
 
 mod axis;
 mod blur;
 mod edge;
+mod edge_lines;
 mod fit;
 pub mod gauge;
 mod measure;

@@ -4,7 +4,8 @@ use super::*;
 use crate::control::pi::PiGains;
 use crate::units::MmPerS2;
 
-fn setup() -> Setup {
+/// The cell of the 2022 paper.
+pub fn setup() -> Setup {
     Setup {
         control: Control {
             target: Mm::constant(42.0),

@@ -1,4 +1,4 @@
-//! The caliper measurement: bands, candidates, chain, sub-pixel edges, width.
+//! One frame after the other: bands, candidates, chain, sub-pixel edges, width.
 
 use crate::calib::SurfaceMap;
 use crate::frame::{Frame, Pixels};
@@ -6,7 +6,8 @@ use crate::geometry::ImagePoint;
 
 use super::axis::{self, Caliper};
 use super::edge::{Candidates, respond};
-use super::gauge::{Gauge, Polarity};
+use super::edge_lines;
+use super::gauge::{Gauge, Method, Polarity};
 use super::outlier;
 use super::pair::{Chain, Search};
 use super::pool::{Bands, View};
@@ -84,6 +85,10 @@ impl Measurer {
         self.right_px.clear();
         if !self.gauge.roi.fits(frame.size()) {
             return Err(Reject::WrongSize { image: frame.size() });
+        }
+        if self.gauge.method == Method::EdgeLines {
+            let points = (&mut self.left_px, &mut self.right_px);
+            return edge_lines::measure(&self.gauge, frame, surface, points);
         }
         let white = self.white.unwrap_or(match frame.pixels() {
             Pixels::Grey8(_) => 255,

@@ -1,0 +1,257 @@
+//! The method of Shojaei Barjuei et al. 2022, section 2.1.1, as a baseline: an
+//! edge detector, the two edge lines of the layer in the region of interest,
+//! and the distance between their midpoints, eq. (1)–(3).
+//!
+//! The paper leaves open which detector and which lines; here it is Canny's
+//! detector and the probabilistic Hough transform. It knows whole pixels only
+//! and no standard deviation of its own; [`SIGMA_PX`] stands for that.
+
+use crate::bridge::{EdgeSettings, Segment, canny_hough};
+use crate::calib::SurfaceMap;
+use crate::frame::Frame;
+use crate::geometry::ImagePoint;
+use crate::units::Mm;
+
+use super::gauge::{Axis, Gauge, Polarity};
+use super::reject::Reject;
+use super::width::{Hints, WidthMeasurement};
+
+/// What rounding to whole pixels leaves in the distance of two lines \[px\].
+const SIGMA_PX: f64 = 0.5;
+/// Steepest edge line against the gauge's axis, in pixels across for each
+/// along.
+const MAX_SLOPE: f64 = 0.45;
+/// Lines that this near to each other at the gauge's middle are one edge \[px\].
+const SAME_EDGE_PX: f64 = 4.0;
+/// Share of the gauge that an edge line must cover.
+const NEED_SHARE: f64 = 0.3;
+
+/// An edge line across the gauge: its ends on the gauge's first and last row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct EdgeLine {
+    first: f64,
+    last: f64,
+    covered: f64,
+}
+
+impl EdgeLine {
+    fn middle(&self) -> f64 {
+        f64::midpoint(self.first, self.last)
+    }
+}
+
+/// Measures a frame with the paper's method. Appends the edge points to the
+/// lists, for pictures of them.
+pub fn measure(
+    gauge: &Gauge,
+    frame: &Frame,
+    surface: &SurfaceMap,
+    (left_px, right_px): (&mut Vec<ImagePoint>, &mut Vec<ImagePoint>),
+) -> Result<WidthMeasurement, Reject> {
+    let refused = |got| Reject::NoPair { got, need: NEED_SHARE };
+    let settings = EdgeSettings {
+        blur_sigma_px: 1.5,
+        thresholds: [4.0 * gauge.min_contrast_grey, 10.0 * gauge.min_contrast_grey],
+        votes: 30,
+        shortest_px: along(gauge) * 0.1,
+        longest_gap_px: along(gauge) * 0.1,
+    };
+    let segments = canny_hough(frame, gauge.roi, &settings).map_err(|_| refused(0.0))?;
+    let lines = edge_lines(gauge, &segments);
+    let (left, right) = best_pair(gauge, surface, frame, &lines).ok_or(refused(0.0))?;
+    left_px.extend([point(gauge, left.first, 0.0), point(gauge, left.last, along(gauge) - 1.0)]);
+    right_px.extend([point(gauge, right.first, 0.0), point(gauge, right.last, along(gauge) - 1.0)]);
+    // Eq. (1), (2): the midpoints of the two lines. Eq. (3): their distance.
+    let middle = (along(gauge) - 1.0) / 2.0;
+    let (m1, m2) = (point(gauge, left.middle(), middle), point(gauge, right.middle(), middle));
+    let on_surface = |px| surface.to_mm(px).ok_or(Reject::OffSurface);
+    let distance = (on_surface(m2)? - on_surface(m1)?).norm();
+    let width = Mm::new(distance).map_err(|_| Reject::OffSurface)?;
+    let per_px = distance / (m2 - m1).norm().max(1e-9);
+    let slope = ((left.last - left.first) + (right.last - right.first)) / (2.0 * along(gauge));
+    Ok(WidthMeasurement {
+        width,
+        sigma: Mm::new(SIGMA_PX * per_px).map_err(|_| Reject::OffSurface)?,
+        roughness: Mm::ZERO,
+        left: m1,
+        right: m2,
+        slant_rad: slope.atan(),
+        hints: Hints { used_share: left.covered.min(right.covered), ..Hints::default() },
+    })
+}
+
+#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+fn along(gauge: &Gauge) -> f64 {
+    match gauge.axis {
+        Axis::Vertical => gauge.roi.height as f64,
+        Axis::Horizontal => gauge.roi.width as f64,
+    }
+}
+
+/// Gauge coordinates of an image point: across the bead, along it.
+#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+fn gauge_coordinates(gauge: &Gauge, at: ImagePoint) -> (f64, f64) {
+    let (x, y) = (at.x - gauge.roi.x as f64, at.y - gauge.roi.y as f64);
+    match gauge.axis {
+        Axis::Vertical => (x, y),
+        Axis::Horizontal => (y, x),
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+fn point(gauge: &Gauge, across: f64, along: f64) -> ImagePoint {
+    let (x, y) = (gauge.roi.x as f64, gauge.roi.y as f64);
+    match gauge.axis {
+        Axis::Vertical => ImagePoint::new(x + across, y + along),
+        Axis::Horizontal => ImagePoint::new(x + along, y + across),
+    }
+}
+
+/// Lines along the bead, carried on to the gauge's ends; pieces of the same
+/// edge are one line with their mean position.
+fn edge_lines(gauge: &Gauge, segments: &[Segment]) -> Vec<EdgeLine> {
+    let length = along(gauge);
+    let mut lines: Vec<EdgeLine> = Vec::new();
+    for segment in segments {
+        let (u0, v0) = gauge_coordinates(gauge, segment.from);
+        let (u1, v1) = gauge_coordinates(gauge, segment.to);
+        let run = v1 - v0;
+        let slope = (u1 - u0) / run;
+        if run.abs() < 2.0 || slope.abs() > MAX_SLOPE {
+            continue;
+        }
+        let covered = run.abs() / length;
+        let new =
+            EdgeLine { first: u0 - slope * v0, last: u0 + slope * (length - 1.0 - v0), covered };
+        let same =
+            lines.iter_mut().find(|line| (line.middle() - new.middle()).abs() < SAME_EDGE_PX);
+        match same {
+            Some(line) => {
+                let sum = line.covered + covered;
+                line.first = (line.first * line.covered + new.first * covered) / sum;
+                line.last = (line.last * line.covered + new.last * covered) / sum;
+                line.covered = sum;
+            }
+            None => lines.push(new),
+        }
+    }
+    for line in &mut lines {
+        line.covered = line.covered.min(1.0);
+    }
+    lines
+}
+
+/// The pair of lines that covers most of the gauge, within the range of widths
+/// and with the bead's polarity.
+fn best_pair(
+    gauge: &Gauge,
+    surface: &SurfaceMap,
+    frame: &Frame,
+    lines: &[EdgeLine],
+) -> Option<(EdgeLine, EdgeLine)> {
+    let middle = (along(gauge) - 1.0) / 2.0;
+    let grey = frame.to_grey8();
+    let mut best: Option<(f64, EdgeLine, EdgeLine)> = None;
+    for left in lines.iter().filter(|line| line.covered >= NEED_SHARE) {
+        for right in lines.iter().filter(|line| line.covered >= NEED_SHARE) {
+            if right.middle() <= left.middle() {
+                continue;
+            }
+            let m1 = surface.to_mm(point(gauge, left.middle(), middle))?;
+            let m2 = surface.to_mm(point(gauge, right.middle(), middle))?;
+            let width = (m2 - m1).norm();
+            let (min, max) = gauge.width_range;
+            if !(min.get()..=max.get()).contains(&width)
+                || !polarity_fits(gauge, frame, &grey, *left, *right)
+            {
+                continue;
+            }
+            let covered = left.covered + right.covered;
+            if best.is_none_or(|(most, ..)| covered > most) {
+                best = Some((covered, *left, *right));
+            }
+        }
+    }
+    best.map(|(_, left, right)| (left, right))
+}
+
+/// Whether the gauge's middle row is brighter between the lines than beside
+/// them, or darker, as the bead is.
+fn polarity_fits(
+    gauge: &Gauge,
+    frame: &Frame,
+    grey: &[u8],
+    left: EdgeLine,
+    right: EdgeLine,
+) -> bool {
+    const BESIDE_PX: f64 = 6.0;
+    let middle = ((along(gauge) - 1.0) / 2.0).round();
+    let level = |across: f64| -> Option<f64> {
+        let at = point(gauge, across.round(), middle);
+        let roi = gauge.roi;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a pixel of the gauge; what is negative saturates and is refused"
+        )]
+        let (x, y) = (at.x as usize, at.y as usize);
+        let inside =
+            (roi.x..roi.x + roi.width).contains(&x) && (roi.y..roi.y + roi.height).contains(&y);
+        inside.then(|| f64::from(grey[y * frame.width() + x]))
+    };
+    let inner = [left.middle() + BESIDE_PX, right.middle() - BESIDE_PX].map(level);
+    let outer = [left.middle() - BESIDE_PX, right.middle() + BESIDE_PX].map(level);
+    let steps = [inner[0].zip(outer[0]), inner[1].zip(outer[1])];
+    steps.iter().flatten().all(|(inner, outer)| match gauge.polarity {
+        Polarity::Bright => inner > outer,
+        Polarity::Dark => inner < outer,
+        Polarity::Any => true,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Pixels;
+    use crate::geometry::Roi;
+    use crate::time::Stamp;
+    use crate::vision::Method;
+
+    fn bar(from: usize, to: usize) -> Frame {
+        let values = (0..100usize)
+            .flat_map(|_| {
+                (0..160usize).map(move |x| if (from..to).contains(&x) { 150 } else { 60 })
+            })
+            .collect();
+        Frame::new(0, Stamp::START, (160, 100), Pixels::Grey8(values)).unwrap()
+    }
+
+    fn gauge() -> Gauge {
+        Gauge {
+            roi: Roi { x: 10, y: 5, width: 140, height: 90 },
+            axis: Axis::Vertical,
+            polarity: Polarity::Bright,
+            width_range: (Mm::constant(2.0), Mm::constant(20.0)),
+            method: Method::EdgeLines,
+            calipers: 64,
+            min_contrast_grey: 6.0,
+        }
+    }
+
+    #[test]
+    fn the_distance_of_the_midpoints_is_the_width_to_a_pixel() {
+        let surface = SurfaceMap::from_scale(0.126_582);
+        let (mut left, mut right) = (Vec::new(), Vec::new());
+        let found = measure(&gauge(), &bar(50, 110), &surface, (&mut left, &mut right)).unwrap();
+        assert!((found.width.get() - 60.0 * 0.126_582).abs() < 2.0 * 0.126_582, "{found:?}");
+        assert_eq!((left.len(), right.len()), (2, 2));
+    }
+
+    #[test]
+    fn a_dark_bead_is_not_a_bright_one() {
+        let surface = SurfaceMap::from_scale(0.126_582);
+        let dark = Gauge { polarity: Polarity::Dark, ..gauge() };
+        let found = measure(&dark, &bar(50, 110), &surface, (&mut Vec::new(), &mut Vec::new()));
+        assert_eq!(found.unwrap_err().status(), "no_pair");
+    }
+}
