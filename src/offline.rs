@@ -1,0 +1,26 @@
+//! What a run leaves behind, and what is done with recorded frames:
+//! `widths.csv`, `summary.json` and `report.html`.
+//!
+//! [`RunLog`] is fed one fact at a time and keeps a bounded amount of them, so
+//! that hours of running cost as much memory as minutes. Every file appears
+//! under its final name only when it is whole.
+
+pub mod log;
+pub mod names;
+pub mod output;
+pub mod picker;
+pub mod picture;
+pub mod progress;
+pub mod report;
+pub mod row;
+pub mod stats;
+pub mod summary;
+#[cfg(test)]
+mod synthetic;
+pub mod widths;
+
+pub use log::{ControlFacts, LogOptions, RunLog};
+pub use output::LogError;
+pub use progress::Progress;
+pub use row::{ControlColumns, FrameRow};
+pub use summary::{Note, Summary};

@@ -1,0 +1,107 @@
+//! `report.html`: one page that needs nothing but itself.
+
+pub mod advice;
+pub mod area;
+pub mod axis;
+pub mod charts;
+pub mod headline;
+pub mod histogram;
+pub mod palette;
+pub mod plot;
+pub mod sections;
+pub mod series;
+pub mod strip;
+pub mod strips;
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use self::charts::Charts;
+use self::headline::Level;
+use super::picker::Chosen;
+use super::stats::Distribution;
+use super::summary::Summary;
+use crate::control::limiter::Limits;
+
+/// Everything that a page is made of.
+#[derive(Debug)]
+pub struct Report<'a> {
+    /// The page's title.
+    pub title: &'a str,
+    /// Names and values under the title.
+    pub about: &'a [(String, String)],
+    /// Share of refused frames that the cell bears.
+    pub max_rejected_share: f64,
+    /// What it came to.
+    pub summary: &'a Summary,
+    /// What the plots show.
+    pub charts: &'a Charts,
+    /// What setpoints may be; none without a controller.
+    pub limits: Option<Limits>,
+    /// Latencies \[ms\]; none without a controller.
+    pub latencies: Option<&'a Distribution>,
+    /// Frames with their edges.
+    pub pictures: &'a [Chosen],
+    /// What else the reader should know.
+    pub remarks: &'a [String],
+}
+
+impl Report<'_> {
+    /// The page.
+    pub fn page(&self) -> String {
+        let verdict = headline::verdict(self.summary, self.max_rejected_share);
+        let (class, word) = match verdict.level {
+            Level::Good => ("good", "Good."),
+            Level::Caution => ("caution", "Look closer."),
+            Level::Bad => ("bad", "Failed."),
+        };
+        let body = html! {
+            h1 { (self.title) }
+            (self.about())
+            div class={ "verdict " (class) } { b { (word) } (verdict.text) (self.remarks()) }
+            (headline::tiles(self.summary))
+            (sections::over_time(self))
+            (sections::over_path(self))
+            (sections::rejections(self))
+            (sections::pictures(self))
+            (sections::hints(self))
+            (sections::latency(self))
+            footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))
+                ". The numbers are in summary.json, every frame is in widths.csv." }
+        };
+        self.frame(&body).into_string()
+    }
+
+    fn frame(&self, body: &Markup) -> Markup {
+        html! {
+            (DOCTYPE)
+            html lang="en" {
+                head {
+                    meta charset="utf-8";
+                    meta name="viewport" content="width=device-width, initial-scale=1";
+                    title { (self.title) }
+                    style { (PreEscaped(palette::variables())) (PreEscaped(include_str!("report/style.css"))) }
+                }
+                body { main { (body) } }
+            }
+        }
+    }
+
+    fn about(&self) -> Markup {
+        html! {
+            div.about {
+                @for (name, value) in self.about { span { (name) " " b { (value) } } }
+            }
+        }
+    }
+
+    fn remarks(&self) -> Markup {
+        html! {
+            @if !self.remarks.is_empty() {
+                ul { @for remark in self.remarks { li { (remark) } } }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

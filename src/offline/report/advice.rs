@@ -1,0 +1,71 @@
+//! What a reason for refusing a frame means, and what to do about it.
+
+/// Meaning and remedy of a status in `widths.csv`.
+pub fn on(status: &str) -> (&'static str, &'static str) {
+    match status {
+        "no_pair" => (
+            "On too few lines across the gauge were two edges found that belong together.",
+            "See that the bead runs through the gauge with ground on both sides; check roi_px, \
+             bead_axis, polarity and width_range_mm.",
+        ),
+        "low_contrast" => (
+            "The bead hardly differs in brightness from what is around it.",
+            "Light from the side, or choose another channel; lower min_contrast_grey only if the \
+             edges are seen well.",
+        ),
+        "saturated" => (
+            "So many pixels are at the end of the scale that the edges are lost.",
+            "Shorten the exposure, dim the light or turn it away from the mirror direction.",
+        ),
+        "width_out_of_range" => (
+            "Two edges were found, but no bead of this cell is that wide.",
+            "Check the calibration and surface_height_mm; widen width_range_mm if such beads are \
+             real.",
+        ),
+        "crooked" => (
+            "The edges run askew by more than 20 degrees, or do not agree with each other.",
+            "Turn the camera or the gauge with the bead; in sharp curves this is to be expected.",
+        ),
+        "clipped" => (
+            "The bead touches the border of the gauge.",
+            "Make roi_px larger across the bead, or bring the bead back to its middle.",
+        ),
+        "wrong_size" => (
+            "The gauge does not lie within the image.",
+            "Check roi_px against the size of the images, and the camera's resolution.",
+        ),
+        "off_surface" => (
+            "By the calibration an edge does not lie on the measured surface.",
+            "Calibrate again, or check surface_height_mm and the robot's z.",
+        ),
+        "unreadable" => (
+            "The frame could not be decoded.",
+            "Look at the file or the camera's cable; the log names each one.",
+        ),
+        _ => ("The frame was refused.", "See the log."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vision::Reject;
+
+    #[test]
+    fn every_reason_is_explained() {
+        let unknown = on("something else");
+        for reject in [
+            Reject::NoPair { got: 0.0, need: 0.5 },
+            Reject::LowContrast { got: 0.0, need: 6.0 },
+            Reject::Saturated { got: 0.5, limit: 0.1 },
+            Reject::WidthOutOfRange { got_mm: 1.0, min_mm: 2.0, max_mm: 3.0 },
+            Reject::Crooked { got_rad: 1.0, limit_rad: 0.3 },
+            Reject::Clipped,
+            Reject::WrongSize { image: (1, 1) },
+            Reject::OffSurface,
+            Reject::Unreadable,
+        ] {
+            assert_ne!(on(reject.status()), unknown, "{}", reject.status());
+        }
+    }
+}

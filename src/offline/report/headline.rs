@@ -1,0 +1,183 @@
+//! The verdict in words, and the figures at the top of the page.
+
+use maud::{Markup, html};
+
+use crate::offline::names::spoken;
+use crate::offline::summary::{ControlSummary, Summary};
+
+/// How a run went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// Nothing to worry about.
+    Good,
+    /// Something to look at.
+    Caution,
+    /// It failed at its task.
+    Bad,
+}
+
+/// How a run went, in plain words.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Verdict {
+    /// In one word.
+    pub level: Level,
+    /// In a few sentences.
+    pub text: String,
+}
+
+/// Judges a run. `max_rejected_share` is the share of refused frames that the
+/// cell bears.
+pub fn verdict(summary: &Summary, max_rejected_share: f64) -> Verdict {
+    let mut level = Level::Good;
+    let mut sentences = vec![width_sentence(summary)];
+    if summary.measured == 0 {
+        level = Level::Bad;
+    } else if summary.rejected_share() > max_rejected_share {
+        level = Level::Caution;
+    }
+    sentences.push(share_sentence(summary, max_rejected_share));
+    if let Some(control) = &summary.control {
+        let (control_level, more) = control_sentences(control);
+        level = level.max(control_level);
+        sentences.extend(more);
+    }
+    Verdict { level, text: sentences.join(" ") }
+}
+
+fn width_sentence(summary: &Summary) -> String {
+    let Some(mean) = summary.width_mean_mm else {
+        return "No width was measured.".to_string();
+    };
+    let spread = summary
+        .width_std_mm
+        .map_or(String::new(), |std| format!(", with a standard deviation of {std:.3} mm"));
+    match (&summary.control, summary.target_width_mm) {
+        (Some(control), Some(target)) => held_sentence(control, target),
+        (_, Some(target)) => format!(
+            "The bead is {mean:.3} mm wide on average{spread}; {} than the {target} mm that are \
+             asked for.",
+            more_or_less(mean - target)
+        ),
+        _ => format!("The bead is {mean:.3} mm wide on average{spread}."),
+    }
+}
+
+fn more_or_less(difference: f64) -> String {
+    let word = if difference < 0.0 { "narrower" } else { "wider" };
+    format!("{:.3} mm {word}", difference.abs())
+}
+
+fn held_sentence(control: &ControlSummary, target: f64) -> String {
+    match (control.width_error_rms_settled_mm, control.width_error_rms_mm) {
+        (Some(settled), _) => format!(
+            "Once settled, the bead was held at {target} mm with an error of {settled:.2} mm RMS."
+        ),
+        (None, Some(rms)) => format!(
+            "The error from {target} mm is {rms:.2} mm RMS over the bead laid under control; the \
+             run was too short to say how well it settles."
+        ),
+        (None, None) => format!(
+            "No bead laid under control was measured, so nothing can be said of how well \
+             {target} mm were held."
+        ),
+    }
+}
+
+fn share_sentence(summary: &Summary, max_rejected_share: f64) -> String {
+    let share = (1.0 - summary.rejected_share()) * 100.0;
+    let frames = summary.frames;
+    if summary.frames == 0 {
+        "There was no frame at all.".to_string()
+    } else if summary.rejected_share() > max_rejected_share {
+        format!(
+            "Only {share:.1} % of {frames} frames were measured; the cell asks for {:.0} %.",
+            (1.0 - max_rejected_share) * 100.0
+        )
+    } else {
+        format!("{share:.1} % of {frames} frames were measured.")
+    }
+}
+
+fn control_sentences(control: &ControlSummary) -> (Level, Vec<String>) {
+    let mut level = Level::Good;
+    let mut sentences = Vec::new();
+    if control.faults > 0 {
+        level = Level::Bad;
+        let why: Vec<String> = control.fault_reasons.keys().map(|name| spoken(name)).collect();
+        let times = if control.faults == 1 { "once" } else { "more than once" };
+        sentences.push(format!("Control gave up {times} ({}).", why.join(", ")));
+    } else {
+        sentences.push("There was no fault.".to_string());
+    }
+    if control.width_error_rms_mm.is_none() {
+        level = level.max(Level::Caution);
+    }
+    // What holds while a run is being ended is no disturbance.
+    let held: f64 =
+        control.held_for_s.iter().filter(|(why, _)| **why != "stopping").map(|(_, s)| s).sum();
+    if held >= 0.05 {
+        level = level.max(Level::Caution);
+        sentences.push(format!("Control held for {held:.1} s."));
+    }
+    if control.limited_s >= 0.05 {
+        sentences.push(format!("A limit shaped the speed for {:.1} s.", control.limited_s));
+    }
+    if control.records_lost > 0 {
+        level = level.max(Level::Caution);
+        sentences.push(format!("{} records were lost.", control.records_lost));
+    }
+    (level, sentences)
+}
+
+/// The figures as tiles.
+pub fn tiles(summary: &Summary) -> Markup {
+    let share = (1.0 - summary.rejected_share()) * 100.0;
+    let measured = if summary.frames == 0 { None } else { Some(share) };
+    html! {
+        div.tiles {
+            (tile("frames", &summary.frames.to_string(), "", &duration(summary)))
+            (tile("measured", &number(measured, 1), "%", &format!("{} refused", summary.frames - summary.measured)))
+            (tile("width", &number(summary.width_mean_mm, 2), "mm", &spread(summary)))
+            @if let Some(control) = &summary.control {
+                (tile("error, settled", &number(control.width_error_rms_settled_mm, 2), "mm RMS",
+                    &format!("{} mm RMS over all", number(control.width_error_rms_mm, 2))))
+                (tile("faults", &control.faults.to_string(), "", &format!("held {:.1} s, limited {:.1} s", control.held_s, control.limited_s)))
+                (tile("latency, 99 %", &number(control.latency_ms.p99, 2), "ms",
+                    &format!("median {}, most {} ms", number(control.latency_ms.p50, 2), number(control.latency_ms.max, 2))))
+            } @else {
+                (tile("uncertainty", &number(summary.sigma_mean_mm, 3), "mm", "mean standard deviation"))
+                (tile("contrast", &number(summary.hints.contrast_median_grey, 0), "grey levels", "median, of 256"))
+                (tile("blur", &number(summary.hints.blur_median_px, 2), "px", "median"))
+            }
+        }
+    }
+}
+
+fn tile(name: &str, value: &str, unit: &str, small: &str) -> Markup {
+    html! {
+        div.tile {
+            div.name { (name) }
+            div.value { (value) @if !unit.is_empty() { span.unit { " " (unit) } } }
+            div.small { (small) }
+        }
+    }
+}
+
+fn duration(summary: &Summary) -> String {
+    summary.duration_s.map_or(String::new(), |secs| match secs {
+        long if long >= 120.0 => format!("in {:.1} min", long / 60.0),
+        short => format!("in {short:.1} s"),
+    })
+}
+
+fn spread(summary: &Summary) -> String {
+    let std = format!("± {} mm", number(summary.width_std_mm, 3));
+    match summary.target_width_mm {
+        Some(target) => format!("{std}, asked for {target}"),
+        None => format!("{std} between frames"),
+    }
+}
+
+fn number(value: Option<f64>, places: usize) -> String {
+    value.map_or("–".to_string(), |value| format!("{value:.places$}"))
+}

@@ -1,0 +1,252 @@
+//! The parts of the page, one below the other.
+
+use base64::Engine as _;
+use maud::{Markup, html};
+
+use super::Report;
+use super::area::{Area, XAxis};
+use super::charts::Twice;
+use super::palette::{self, Ink};
+use super::plot::{Layer, Plot, y_range};
+use super::series::Series;
+use super::strip::Strip;
+use super::strips::{self, Row};
+use super::{advice, histogram};
+use crate::offline::stats::as_f64;
+
+/// Width, speed, states and limits over time, or over frames.
+pub fn over_time(report: &Report<'_>) -> Markup {
+    let charts = report.charts;
+    let strips = [&charts.refused, &charts.states, &charts.limits].map(strip_extent);
+    let extents = [charts.width.time.extent(), charts.speed.time.extent()];
+    let Some(range) = spanned(extents.into_iter().chain(strips)) else { return html! {} };
+    let timed = charts.timed == Some(true);
+    let axis = if timed { XAxis::time(range) } else { XAxis::frames(range) };
+    html! {
+        section {
+            h2 { @if timed { "Over time" } @else { "Frame by frame" } }
+            (width_plot(report, &axis, |twice| &twice.time))
+            (strips::draw(&axis, &[Row { name: "refused", strip: &charts.refused, ink: refused }]))
+            @if report.summary.control.is_some() {
+                (speed_plot(report, &axis, |twice| &twice.time))
+                (strips::draw(&axis, &[
+                    Row { name: "state", strip: &charts.states, ink: state },
+                    Row { name: "limit", strip: &charts.limits, ink: limit },
+                ]))
+                (legend(&[
+                    ("idle", palette::IDLE, "block"), ("priming", palette::PRIMING, "block"),
+                    ("tracking", palette::TRACKING, "block"), ("holding", palette::HOLDING, "block"),
+                    ("fault", palette::FAULT, "block"), ("a limit acts", palette::LIMIT, "block"),
+                ]))
+            }
+        }
+    }
+}
+
+/// Width and speed over the path.
+pub fn over_path(report: &Report<'_>) -> Markup {
+    let charts = report.charts;
+    let extents = [charts.width.path.extent(), charts.speed.path.extent()];
+    let Some(range) = spanned(extents.into_iter()) else { return html! {} };
+    let axis = XAxis::path(range);
+    html! {
+        section {
+            h2 { "Along the bead" }
+            p.hint { "Width and speed stand where the bead was laid: below a width is the speed of \
+                the nozzle at that very place, before the camera saw it." }
+            (width_plot(report, &axis, |twice| &twice.path))
+            (speed_plot(report, &axis, |twice| &twice.path))
+        }
+    }
+}
+
+fn width_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) -> Markup {
+    let charts = report.charts;
+    let width = pick(&charts.width);
+    let target = report.summary.target_width_mm;
+    let values: Vec<f64> = target.into_iter().collect();
+    let name = target.map(|target| format!("{target} mm")).unwrap_or_default();
+    let mut layers = vec![
+        Layer::Band(pick(&charts.width_low), pick(&charts.width_high), palette::WIDTH),
+        Layer::Curve(width, palette::WIDTH),
+    ];
+    layers.extend(target.map(|target| Layer::Level(target, palette::TARGET, name.as_str())));
+    let plot = Plot {
+        area: Area::wide(270.0),
+        x: axis,
+        y_title: "width [mm]",
+        y_range: y_range(&[width], &values),
+        layers,
+    };
+    let mut entries =
+        vec![("width", palette::WIDTH, ""), ("± 2 standard deviations", palette::WIDTH, "area")];
+    if target.is_some() {
+        entries.push(("asked for", palette::TARGET, "dash"));
+    }
+    entries.push(("refused frames, in the strip", palette::REJECTED, "block"));
+    if axis.title.starts_with("distance") {
+        entries.pop();
+    }
+    html! { (legend(&entries)) (plot.draw()) }
+}
+
+fn speed_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) -> Markup {
+    let charts = report.charts;
+    let (speed, setpoint) = (pick(&charts.speed), pick(&charts.setpoint));
+    let demand = pick(&charts.demand);
+    let bounds = report.limits.map(|limits| [limits.min_speed.get(), limits.max_speed.get()]);
+    let names = bounds.map(|bounds| bounds.map(|bound| format!("{bound} mm/s")));
+    let mut layers = vec![
+        Layer::Wish(demand, palette::DEMAND),
+        Layer::Stairs(setpoint, palette::SETPOINT),
+        Layer::Curve(speed, palette::SPEED),
+    ];
+    if let (Some(bounds), Some(names)) = (bounds, &names) {
+        let levels = bounds.iter().zip(names);
+        layers.extend(levels.map(|(bound, name)| Layer::Level(*bound, palette::LIMIT, name)));
+    }
+    let plot = Plot {
+        area: Area::wide(270.0),
+        x: axis,
+        y_title: "speed [mm/s]",
+        // A demand far beyond the limits would press everything else flat.
+        y_range: y_range(&[speed, setpoint], bounds.as_ref().map_or(&[], |bounds| bounds)),
+        layers,
+    };
+    html! {
+        (legend(&[
+            ("robot", palette::SPEED, ""), ("setpoint", palette::SETPOINT, ""),
+            ("demand of the controller", palette::DEMAND, "dash"),
+            ("limits of the cell", palette::LIMIT, "dash"),
+        ]))
+        (plot.draw())
+    }
+}
+
+/// Which frames were refused, why, and what to do.
+pub fn rejections(report: &Report<'_>) -> Markup {
+    let summary = report.summary;
+    let mut rejected: Vec<_> = summary.rejected.iter().collect();
+    rejected.sort_by(|a, b| b.1.cmp(a.1));
+    html! {
+        @if !rejected.is_empty() {
+            section {
+                h2 { "Refused frames" }
+                div.wide { table {
+                    thead { tr {
+                        th { "status" } th.number { "frames" } th.number { "share" }
+                        th { "what it means" } th { "what to do" }
+                    } }
+                    tbody { @for (status, count) in rejected {
+                        @let (meaning, remedy) = advice::on(status);
+                        tr {
+                            td { code { (status) } }
+                            td.number { (count) }
+                            td.number { (format!("{:.2} %", as_f64(*count) / as_f64(summary.frames.max(1)) * 100.0)) }
+                            td { (meaning) }
+                            td { (remedy) }
+                        }
+                    } }
+                } }
+            }
+        }
+    }
+}
+
+/// Some frames with the edges drawn in.
+pub fn pictures(report: &Report<'_>) -> Markup {
+    html! {
+        @if !report.pictures.is_empty() {
+            section {
+                h2 { "What the camera saw" }
+                (legend(&[
+                    ("left or upper edge", palette::LEFT_EDGE, "dot"),
+                    ("right or lower edge", palette::RIGHT_EDGE, "dot"),
+                    ("gauge", palette::GAUGE, "dash"),
+                ]))
+                div.pictures { @for picture in report.pictures { figure {
+                    img alt=(format!("frame {}", picture.frame)) src=(data_uri(&picture.jpeg));
+                    figcaption { b { "frame " (picture.frame) } " · " (picture.caption) }
+                } } }
+            }
+        }
+    }
+}
+
+fn data_uri(jpeg: &[u8]) -> String {
+    format!("data:image/jpeg;base64,{}", base64::engine::general_purpose::STANDARD.encode(jpeg))
+}
+
+/// How good the pictures are.
+pub fn hints(report: &Report<'_>) -> Markup {
+    let charts = report.charts;
+    let Some(range) = charts.contrast.extent() else { return html! {} };
+    let axis = if charts.timed == Some(true) { XAxis::time(range) } else { XAxis::frames(range) };
+    let small = |series: &Series, y_title: &str| {
+        let (low, high) = y_range(&[series], &[0.0]);
+        Plot {
+            area: Area::half(190.0),
+            x: &axis,
+            y_title,
+            y_range: (low.max(0.0), high.max(0.1)),
+            layers: vec![Layer::Curve(series, palette::WIDTH)],
+        }
+        .draw()
+    };
+    html! {
+        section {
+            h2 { "How good the pictures are" }
+            p.hint { "Much contrast, little blur and noise and no saturation make a sure width. A \
+                slow drift tells of dust on the lens or of changing light." }
+            div.pair {
+                (small(&charts.contrast, "contrast [grey levels of 256]"))
+                (small(&charts.blur, "blur of the edges [px]"))
+                (small(&charts.noise, "noise of a pixel [grey levels of 256]"))
+                (small(&charts.saturated, "saturated pixels in the gauge [%]"))
+            }
+        }
+    }
+}
+
+/// How long a frame takes to become a setpoint.
+pub fn latency(report: &Report<'_>) -> Markup {
+    html! {
+        @if let Some(latencies) = report.latencies.filter(|latencies| latencies.total() > 0) {
+            section {
+                h2 { "From frame to setpoint" }
+                p.hint { "From having the frame to having written the first setpoint that uses it, \
+                    less the wait for the fixed-rate sender's turn." }
+                (histogram::draw(latencies))
+            }
+        }
+    }
+}
+
+fn legend(entries: &[(&str, Ink, &str)]) -> Markup {
+    html! {
+        div.legend { @for (name, ink, kind) in entries {
+            @let property = if matches!(*kind, "" | "dash") { "border-color" } else { "background" };
+            span { i class=(kind) style=(format!("{property}:{}", ink.css())) {} (name) }
+        } }
+    }
+}
+
+fn refused(name: &str) -> Option<Ink> {
+    (name != "ok").then_some(palette::REJECTED)
+}
+
+fn state(name: &str) -> Option<Ink> {
+    Some(palette::state(name))
+}
+
+fn limit(name: &str) -> Option<Ink> {
+    (name != "none").then_some(palette::LIMIT)
+}
+
+fn strip_extent(strip: &Strip) -> Option<(f64, f64)> {
+    Some((strip.spells().first()?.from, strip.spells().last()?.to))
+}
+
+fn spanned(extents: impl Iterator<Item = Option<(f64, f64)>>) -> Option<(f64, f64)> {
+    extents.flatten().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
