@@ -40,5 +40,8 @@ pub fn fault(fault: &Fault) -> String {
 
 /// A name as it is shown to people.
 pub fn spoken(name: &str) -> String {
-    name.replace('_', " ")
+    match name.strip_prefix("held_too_long_") {
+        Some(why) => format!("held too long: {}", spoken(why)),
+        None => name.replace('_', " "),
+    }
 }

@@ -106,24 +106,24 @@ impl FramePicker {
     pub fn finish(self) -> Vec<Chosen> {
         let mut chosen: Vec<Kept> = self.refused;
         chosen.extend(self.first);
-        for kept in self.least_sure.into_iter().map(|(_, kept)| kept) {
-            add(&mut chosen, kept);
+        let least_sure = self.least_sure.map(|(_, kept)| kept);
+        if let Some(kept) = least_sure.filter(|kept| is_new(&chosen, kept)) {
+            chosen.push(kept);
         }
         let room = PICTURES.saturating_sub(chosen.len());
-        let spread = self.spread;
+        let mut spread = self.spread;
+        spread.retain(|kept| is_new(&chosen, kept));
         for index in evenly(spread.len(), room) {
-            add(&mut chosen, spread[index].clone());
+            chosen.push(spread[index].clone());
         }
         chosen.sort_by_key(|kept| kept.snapshot.frame);
         chosen.iter().filter_map(draw).collect()
     }
 }
 
-/// A frame that is there already is not shown twice.
-fn add(chosen: &mut Vec<Kept>, kept: Kept) {
-    if chosen.iter().all(|other| other.snapshot.frame != kept.snapshot.frame) {
-        chosen.push(kept);
-    }
+/// A frame is not shown twice.
+fn is_new(chosen: &[Kept], kept: &Kept) -> bool {
+    chosen.iter().all(|other| other.snapshot.frame != kept.snapshot.frame)
 }
 
 /// `wanted` of `count` indices, evenly spaced, the last among them.

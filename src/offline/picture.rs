@@ -108,12 +108,12 @@ impl Snapshot {
         let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
             .map(|(x, y)| self.place(ImagePoint::new(x, y), enlarge));
         for pair in corners.windows(2) {
-            canvas.dashes(pair[0], pair[1], 1.0, colour);
+            canvas.dashes(pair[0], pair[1], 1.4, colour);
         }
     }
 
     fn draw_edges(&self, canvas: &mut Canvas, enlarge: f64) {
-        let radius = (self.scale * enlarge * 0.45).clamp(1.2, 2.4);
+        let radius = (self.scale * enlarge * 0.8).clamp(2.0, 3.2);
         for (points, ink) in [(&self.left, LEFT_EDGE), (&self.right, RIGHT_EDGE)] {
             for point in points {
                 canvas.dot(self.place(*point, enlarge), radius, ink.light);
@@ -122,11 +122,11 @@ impl Snapshot {
         let Ok(measured) = &self.outcome else { return };
         let left = self.place(measured.left, enlarge);
         let right = self.place(measured.right, enlarge);
-        canvas.line(left, right, 2.2, BLACK);
-        canvas.line(left, right, 1.0, WHITE);
+        canvas.line(left, right, 2.6, BLACK);
+        canvas.line(left, right, 1.3, WHITE);
         for (end, ink) in [(left, LEFT_EDGE), (right, RIGHT_EDGE)] {
-            canvas.dot(end, 5.2, BLACK);
-            canvas.dot(end, 4.0, ink.light);
+            canvas.dot(end, 7.5, BLACK);
+            canvas.dot(end, 6.0, ink.light);
         }
     }
 }

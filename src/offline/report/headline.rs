@@ -143,7 +143,7 @@ pub fn tiles(summary: &Summary) -> Markup {
                     &format!("{} mm RMS over all", number(control.width_error_rms_mm, 2))))
                 (tile("faults", &control.faults.to_string(), "", &format!("held {:.1} s, limited {:.1} s", control.held_s, control.limited_s)))
                 (tile("latency, 99 %", &number(control.latency_ms.p99, 2), "ms",
-                    &format!("median {}, most {} ms", number(control.latency_ms.p50, 2), number(control.latency_ms.max, 2))))
+                    &format!("median {}, longest {}", number(control.latency_ms.p50, 2), number(control.latency_ms.max, 2))))
             } @else {
                 (tile("uncertainty", &number(summary.sigma_mean_mm, 3), "mm", "mean standard deviation"))
                 (tile("contrast", &number(summary.hints.contrast_median_grey, 0), "grey levels", "median, of 256"))
@@ -171,10 +171,10 @@ fn duration(summary: &Summary) -> String {
 }
 
 fn spread(summary: &Summary) -> String {
-    let std = format!("± {} mm", number(summary.width_std_mm, 3));
+    let std = format!("± {}", number(summary.width_std_mm, 2));
     match summary.target_width_mm {
-        Some(target) => format!("{std}, asked for {target}"),
-        None => format!("{std} between frames"),
+        Some(target) => format!("{std}, target {target} mm"),
+        None => format!("{std} mm from frame to frame"),
     }
 }
 

@@ -35,7 +35,7 @@ pub fn draw(latencies: &Distribution) -> Markup {
             @if let Some(value) = latencies.quantile(q) {
                 @let at = round(x.place(value));
                 line.level x1=(at) x2=(at) y1=(top) y2=(bottom) stroke=(palette::TARGET.css()) {}
-                text.label x=(at - 5.0) y=(top + row) text-anchor="end" fill=(palette::TARGET.css()) {
+                text.label x=(at - 5.0) y=(top + row) text-anchor="end" {
                     (name) " " (format!("{value:.2} ms"))
                 }
             }

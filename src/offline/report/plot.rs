@@ -86,10 +86,10 @@ impl Plot<'_> {
     }
 
     fn label(&self, layer: &Layer<'_>, y: &Scale) -> Markup {
-        let Layer::Level(value, ink, text) = layer else { return html! {} };
+        let Layer::Level(value, _, text) = layer else { return html! {} };
         let at = round(y.place(*value)) - 4.0;
         html! {
-            text.label x=(self.area.across().1 - 4.0) y=(at) text-anchor="end" fill=(ink.css()) {
+            text.label x=(self.area.across().1 - 4.0) y=(at) text-anchor="end" {
                 (text)
             }
         }

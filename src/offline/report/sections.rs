@@ -81,7 +81,7 @@ fn width_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) ->
     let mut entries =
         vec![("width", palette::WIDTH, ""), ("± 2 standard deviations", palette::WIDTH, "area")];
     if target.is_some() {
-        entries.push(("asked for", palette::TARGET, "dash"));
+        entries.push(("target", palette::TARGET, "dash"));
     }
     entries.push(("refused frames, in the strip", palette::REJECTED, "block"));
     if axis.title.starts_with("distance") {
@@ -162,9 +162,10 @@ pub fn pictures(report: &Report<'_>) -> Markup {
                 (legend(&[
                     ("left or upper edge", palette::LEFT_EDGE, "dot"),
                     ("right or lower edge", palette::RIGHT_EDGE, "dot"),
-                    ("gauge", palette::GAUGE, "dash"),
+                    ("gauge", palette::GAUGE, "dash"), ("gauge of a refused frame", palette::REJECTED, "dash"),
                 ]))
-                div.pictures { @for picture in report.pictures { figure {
+                p.hint { "A click enlarges a picture; a click beside it puts it back." }
+                div.pictures { @for picture in report.pictures { figure tabindex="0" {
                     img alt=(format!("frame {}", picture.frame)) src=(data_uri(&picture.jpeg));
                     figcaption { b { "frame " (picture.frame) } " · " (picture.caption) }
                 } } }

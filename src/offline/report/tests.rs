@@ -35,7 +35,7 @@ fn a_run_leaves_a_page_that_needs_nothing_but_itself() {
     assert!(page.contains("Run of cell.toml &lt;demo &amp; more&gt;"));
     assert!(!page.contains("<demo"));
     assert!(page.len() < 3_000_000, "{}", page.len());
-    assert_eq!(page.matches("<figure>").count(), 12);
+    assert_eq!(page.matches("<figure ").count(), 12);
     assert_eq!(page.matches("<svg").count(), page.matches("</svg>").count());
     for word in
         ["From frame to setpoint", "Along the bead", "Refused frames", "no STATE for 500 ms"]

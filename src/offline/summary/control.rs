@@ -10,7 +10,7 @@ use crate::control::{Event, Limit, State, Step};
 use crate::offline::names;
 use crate::offline::row::FrameRow;
 use crate::offline::stats::{Distribution, Moments};
-use crate::time::Stamp;
+use crate::time::{Span, Stamp};
 use crate::units::Mm;
 
 /// Path length after the start of control from which the bead counts as
@@ -88,9 +88,9 @@ pub struct ControlTally {
     error: Moments,
     error_size: Moments,
     error_settled: Moments,
-    limited_by_s: BTreeMap<&'static str, f64>,
-    held_for_s: BTreeMap<&'static str, f64>,
-    states_s: BTreeMap<&'static str, f64>,
+    limited_by: Times,
+    held_for: Times,
+    states: Times,
     fault_reasons: BTreeMap<String, u64>,
     latency: Distribution,
     send_wait: Distribution,
@@ -186,13 +186,13 @@ impl ControlTally {
             width_error_rms_mm: self.error.rms(),
             width_error_rms_settled_mm: self.error_settled.rms(),
             setpoints_sent: self.setpoints,
-            limited_s: total(&self.limited_by_s),
-            limited_by_s: self.limited_by_s.clone(),
-            held_s: total(&self.held_for_s),
-            held_for_s: self.held_for_s.clone(),
+            limited_s: total(&self.limited_by),
+            limited_by_s: seconds(&self.limited_by),
+            held_s: total(&self.held_for),
+            held_for_s: seconds(&self.held_for),
             faults: self.fault_reasons.values().sum(),
             fault_reasons: self.fault_reasons.clone(),
-            states_s: self.states_s.clone(),
+            states_s: seconds(&self.states),
             latency_ms: Quantiles::of(&self.latency),
             send_wait_ms: Quantiles::of(&self.send_wait),
             frames_superseded: self.superseded,
@@ -203,18 +203,28 @@ impl ControlTally {
     }
 
     fn spend(&mut self, lapse: &Lapse) {
-        let secs = lapse.span.secs();
-        *self.states_s.entry(lapse.state.name()).or_default() += secs;
+        spend(&mut self.states, lapse.state.name(), lapse.span);
         if let State::Holding(why) = &lapse.state {
-            *self.held_for_s.entry(names::hold(why)).or_default() += secs;
+            spend(&mut self.held_for, names::hold(why), lapse.span);
         }
         if lapse.limit != Limit::None {
-            *self.limited_by_s.entry(names::limit(lapse.limit)).or_default() += secs;
+            spend(&mut self.limited_by, names::limit(lapse.limit), lapse.span);
         }
     }
 }
 
-/// The empty sum of floats is −0, which nobody wants to read.
-fn total(parts: &BTreeMap<&'static str, f64>) -> f64 {
-    parts.values().fold(0.0, |sum, part| sum + part)
+/// Time for each reason, summed without rounding.
+type Times = BTreeMap<&'static str, Span>;
+
+fn spend(times: &mut Times, reason: &'static str, span: Span) {
+    let sum = times.entry(reason).or_default();
+    *sum = *sum + span;
+}
+
+fn seconds(times: &Times) -> BTreeMap<&'static str, f64> {
+    times.iter().map(|(reason, span)| (*reason, span.secs())).collect()
+}
+
+fn total(times: &Times) -> f64 {
+    times.values().fold(Span::ZERO, |sum, span| sum + *span).secs()
 }
