@@ -3,7 +3,10 @@
 pub mod calibration_file;
 pub mod camera;
 pub mod clock;
+pub mod foxglove;
 pub mod image_file;
+pub mod record;
+pub mod recording;
 pub mod robot;
 pub mod robot_sim;
 pub mod whole_file;

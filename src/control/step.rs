@@ -106,20 +106,28 @@ impl State {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Trace {
     /// Frame whose width was used; none where none was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame: Option<u64>,
     /// When that frame was captured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub captured_at: Option<Stamp>,
     /// Where along the path the bead that was measured had been laid.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bead_path_mm: Option<Mm>,
     /// Distance of the nozzle along the path when the frame was captured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nozzle_path_mm: Option<Mm>,
     /// Measured less wanted width.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error_mm: Option<Mm>,
     /// Part of the demand that is proportional to the error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub proportional_mm_per_s: Option<MmPerS>,
     /// Part of the demand that the controller has gathered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub integral_mm_per_s: Option<MmPerS>,
     /// Speed that the controller would like.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub demand_mm_per_s: Option<MmPerS>,
     /// The last limit that acted.
     pub limit: Limit,
@@ -130,6 +138,7 @@ pub struct Trace {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Step {
     /// What to send to the robot now; mostly nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub command: Option<Command>,
     /// The state after the event.
     pub state: State,

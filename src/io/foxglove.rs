@@ -1,0 +1,149 @@
+//! The two image messages of the Foxglove schemas, as protobuf, with the
+//! description of themselves that goes into a recording.
+
+use prost::Message as _;
+use prost_types::field_descriptor_proto::{Label, Type};
+use prost_types::{
+    DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet, Timestamp,
+};
+
+/// Schema name of [`CompressedImage`].
+pub const COMPRESSED_IMAGE: &str = "foxglove.CompressedImage";
+/// Schema name of [`RawImage`].
+pub const RAW_IMAGE: &str = "foxglove.RawImage";
+
+const TIMESTAMP: &str = ".google.protobuf.Timestamp";
+const TIMESTAMP_FILE: &str = "google/protobuf/timestamp.proto";
+const NS_PER_S: u64 = 1_000_000_000;
+
+/// `foxglove.CompressedImage`.
+#[derive(Clone, PartialEq, prost::Message)]
+pub struct CompressedImage {
+    /// When the image was captured.
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: Option<Timestamp>,
+    /// Frame of reference of the camera.
+    #[prost(string, tag = "4")]
+    pub frame_id: String,
+    /// An image file.
+    #[prost(bytes = "vec", tag = "2")]
+    pub data: Vec<u8>,
+    /// Its format, such as `png`.
+    #[prost(string, tag = "3")]
+    pub format: String,
+}
+
+/// `foxglove.RawImage`.
+#[derive(Clone, PartialEq, prost::Message)]
+pub struct RawImage {
+    /// When the image was captured.
+    #[prost(message, optional, tag = "1")]
+    pub timestamp: Option<Timestamp>,
+    /// Frame of reference of the camera.
+    #[prost(string, tag = "7")]
+    pub frame_id: String,
+    /// Width \[px\].
+    #[prost(fixed32, tag = "2")]
+    pub width: u32,
+    /// Height \[px\].
+    #[prost(fixed32, tag = "3")]
+    pub height: u32,
+    /// What the pixels are, such as `mono8`.
+    #[prost(string, tag = "4")]
+    pub encoding: String,
+    /// Bytes from one row to the next.
+    #[prost(fixed32, tag = "5")]
+    pub step: u32,
+    /// The rows.
+    #[prost(bytes = "vec", tag = "6")]
+    pub data: Vec<u8>,
+}
+
+/// A timestamp from nanoseconds since 1970.
+pub fn timestamp(ns: u64) -> Timestamp {
+    Timestamp {
+        seconds: i64::try_from(ns / NS_PER_S).unwrap_or(i64::MAX),
+        nanos: i32::try_from(ns % NS_PER_S).unwrap_or(0),
+    }
+}
+
+/// Nanoseconds since 1970; `None` for an unset or impossible timestamp. The
+/// zero that many writers leave there counts as unset.
+pub fn timestamp_ns(stamp: Option<&Timestamp>) -> Option<u64> {
+    let stamp = stamp?;
+    let seconds = u64::try_from(stamp.seconds).ok()?;
+    let nanos = u64::try_from(stamp.nanos).ok()?;
+    let ns = seconds.checked_mul(NS_PER_S)?.checked_add(nanos)?;
+    (ns > 0).then_some(ns)
+}
+
+/// The schema record of [`CompressedImage`]: a `FileDescriptorSet` that holds
+/// all that it refers to.
+pub fn compressed_image_schema() -> Vec<u8> {
+    let image = FileDescriptorProto {
+        name: Some("foxglove/CompressedImage.proto".into()),
+        package: Some("foxglove".into()),
+        dependency: vec![TIMESTAMP_FILE.into()],
+        message_type: vec![DescriptorProto {
+            name: Some("CompressedImage".into()),
+            field: vec![
+                field("timestamp", 1, Type::Message, Some(TIMESTAMP)),
+                field("frame_id", 4, Type::String, None),
+                field("data", 2, Type::Bytes, None),
+                field("format", 3, Type::String, None),
+            ],
+            ..DescriptorProto::default()
+        }],
+        syntax: Some("proto3".into()),
+        ..FileDescriptorProto::default()
+    };
+    FileDescriptorSet { file: vec![timestamp_file(), image] }.encode_to_vec()
+}
+
+fn timestamp_file() -> FileDescriptorProto {
+    FileDescriptorProto {
+        name: Some(TIMESTAMP_FILE.into()),
+        package: Some("google.protobuf".into()),
+        message_type: vec![DescriptorProto {
+            name: Some("Timestamp".into()),
+            field: vec![
+                field("seconds", 1, Type::Int64, None),
+                field("nanos", 2, Type::Int32, None),
+            ],
+            ..DescriptorProto::default()
+        }],
+        syntax: Some("proto3".into()),
+        ..FileDescriptorProto::default()
+    }
+}
+
+fn field(name: &str, number: i32, kind: Type, of: Option<&str>) -> FieldDescriptorProto {
+    FieldDescriptorProto {
+        name: Some(name.into()),
+        number: Some(number),
+        label: Some(Label::Optional.into()),
+        r#type: Some(kind.into()),
+        type_name: of.map(Into::into),
+        json_name: Some(if name == "frame_id" { "frameId".into() } else { name.into() }),
+        ..FieldDescriptorProto::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_timestamp_keeps_its_nanoseconds() {
+        let ns = 1_763_683_200_123_456_789;
+        assert_eq!(timestamp_ns(Some(&timestamp(ns))), Some(ns));
+    }
+
+    #[test]
+    fn an_impossible_timestamp_is_none() {
+        assert_eq!(timestamp_ns(None), None);
+        assert_eq!(timestamp_ns(Some(&Timestamp { seconds: 0, nanos: 0 })), None);
+        assert_eq!(timestamp_ns(Some(&Timestamp { seconds: -1, nanos: 0 })), None);
+        assert_eq!(timestamp_ns(Some(&Timestamp { seconds: i64::MAX, nanos: 1 })), None);
+    }
+}

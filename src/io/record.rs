@@ -1,0 +1,308 @@
+//! Records a run to MCAP: every event with the step that answered it, and
+//! frames as far as the disk keeps up.
+//!
+//! ```text
+//! control thread ── events+steps ──────────────▶ writer ──▶ recording.mcap.partial
+//! camera thread ── frames ──▶ PNG encoder ──▶      │
+//!                                                  └─ finished: recording.mcap
+//! ```
+//!
+//! Neither the control nor the camera thread ever waits. Frames that do not fit
+//! their queue are dropped and counted. An event that does not fit its queue,
+//! or cannot be written, ends the recording there: [`Recorder::record`] fails
+//! from then on and nothing later is taken, so that a recording is always an
+//! unbroken beginning of its run. What has been taken reaches the operating
+//! system within half a second.
+
+mod encode;
+pub mod format;
+mod mux;
+pub mod sink;
+mod writer;
+
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
+
+use crate::config::cell::KeepFrames;
+use crate::control::{Event, Step};
+use crate::frame::Frame;
+use crate::ports::{RecordError, Recorder};
+use crate::time::Stamp;
+use encode::FrameJob;
+use format::{FORMAT_VERSION, RunInfo};
+use mux::Mux;
+use sink::{FileSink, Outlet, Sink};
+use writer::{Inputs, WriterThread};
+
+/// What is recorded about the run itself, and which frames.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordConfig {
+    /// Which frames are kept.
+    pub frames: KeepFrames,
+    /// Wall clock at stamp 0 \[ns since 1970\].
+    pub epoch_ns: u64,
+    /// The cell file as the command named it.
+    pub cell_name: String,
+    /// The cell file's text.
+    pub cell_text: String,
+    /// The calibration file's text, where the cell has one.
+    pub calibration_text: Option<String>,
+}
+
+/// What a finished recording holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordReport {
+    /// Events.
+    pub events: u64,
+    /// Steps.
+    pub steps: u64,
+    /// Frames.
+    pub frames_kept: u64,
+    /// Frames that should have been kept, but for which there was no time.
+    pub frames_dropped: u64,
+    /// Size of the file.
+    pub bytes: u64,
+    /// Where it is.
+    pub path: PathBuf,
+}
+
+/// A recording that misses the end of its run. It is readable up to there, and
+/// keeps the name of a partial one.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{why}; {} holds the first {} events", report.path.display(), report.events)]
+pub struct Incomplete {
+    /// Why.
+    pub why: RecordError,
+    /// What there is.
+    pub report: RecordReport,
+}
+
+/// Sizes and times, which tests make small.
+#[derive(Debug, Clone, Copy)]
+struct Tuning {
+    flush_every: Duration,
+    events: usize,
+    frames: usize,
+    encoded: usize,
+}
+
+impl Default for Tuning {
+    fn default() -> Self {
+        Self { flush_every: Duration::from_millis(400), events: 4096, frames: 8, encoded: 4 }
+    }
+}
+
+/// An event and its answer, on the way to the writer.
+struct Answered {
+    n: u64,
+    now: Stamp,
+    event: Event,
+    step: Step,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Counts {
+    events: u64,
+    steps: u64,
+    frames: u64,
+}
+
+/// What the threads know in common.
+struct Shared {
+    failure: OnceLock<RecordError>,
+    alarm: Sender<RecordError>,
+    frames_dropped: AtomicU64,
+}
+
+impl Shared {
+    /// The first failure counts, is told once, and is what comes back.
+    fn fail(&self, why: RecordError) -> RecordError {
+        if self.failure.set(why.clone()).is_ok() {
+            tracing::error!("recording ends here: {}", why.0);
+            // The channel holds one, and there is only one.
+            self.alarm.try_send(why.clone()).unwrap_or_default();
+        }
+        self.failure().cloned().unwrap_or(why)
+    }
+
+    fn failure(&self) -> Option<&RecordError> {
+        self.failure.get()
+    }
+}
+
+/// Gives frames to the recorder, from any thread.
+#[derive(Clone)]
+pub struct FrameTap {
+    keep: KeepFrames,
+    jobs: Sender<FrameJob>,
+    shared: Arc<Shared>,
+}
+
+impl FrameTap {
+    /// Takes a frame if it is one that is kept and there is room for it; never
+    /// waits.
+    pub fn frame(&self, frame: Arc<Frame>) {
+        let wanted = match self.keep {
+            KeepFrames::None => false,
+            KeepFrames::Every(nth) => frame.seq.is_multiple_of(nth.max(1)),
+        };
+        if wanted && self.jobs.try_send(FrameJob::Encode(frame)).is_err() {
+            self.shared.frames_dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+/// The recorder as the control thread holds it. Dropping it finishes the
+/// recording as [`Self::finish`] does, but tells nobody how that went.
+pub struct RecorderHandle {
+    next: u64,
+    answered: Option<Sender<Answered>>,
+    tap: FrameTap,
+    path: PathBuf,
+    writer: Option<JoinHandle<RecordReport>>,
+}
+
+/// Begins `recording.mcap.partial` in `folder`, which becomes
+/// `recording.mcap` when it is finished; a recording that is already there is
+/// an error. The channel gives the first failure, so that control hears of it
+/// even when it has nothing to record.
+pub fn start(
+    config: &RecordConfig,
+    folder: &Path,
+) -> Result<(RecorderHandle, Receiver<RecordError>), RecordError> {
+    start_with(config, FileSink::create(folder)?, Tuning::default())
+}
+
+fn start_with<S: Sink + 'static>(
+    config: &RecordConfig,
+    sink: S,
+    tuning: Tuning,
+) -> Result<(RecorderHandle, Receiver<RecordError>), RecordError> {
+    let run = RunInfo {
+        format_version: FORMAT_VERSION,
+        program_version: env!("CARGO_PKG_VERSION").to_string(),
+        epoch_ns: config.epoch_ns,
+        cell_name: config.cell_name.clone(),
+    };
+    let mut mux = Mux::new(&run, &config.cell_text, config.calibration_text.as_deref())
+        .map_err(|error| RecordError(error.to_string()))?;
+    let path = sink.path().to_path_buf();
+    let mut outlet = Outlet::new(sink);
+    mux.take(outlet.waiting());
+    outlet
+        .push()
+        .map_err(|error| RecordError(format!("cannot write {}: {error}", path.display())))?;
+
+    let (alarm, alarms) = bounded(1);
+    let shared =
+        Arc::new(Shared { failure: OnceLock::new(), alarm, frames_dropped: AtomicU64::new(0) });
+    let (answered, answered_out) = bounded(tuning.events);
+    let (jobs, jobs_out) = bounded(tuning.frames);
+    let (encoded, encoded_out) = bounded(tuning.encoded);
+    let (epoch_ns, encoder_shared) = (config.epoch_ns, Arc::clone(&shared));
+    spawn("frame encoder", move || {
+        encode::run(&jobs_out, &encoded, epoch_ns, &encoder_shared);
+    })?;
+    let thread =
+        WriterThread { mux, outlet, shared: Arc::clone(&shared), tuning, safe: Counts::default() };
+    let inputs = Inputs { answered: answered_out, frames: encoded_out };
+    let writer = spawn("recorder", move || thread.run(inputs))?;
+    let tap = FrameTap { keep: config.frames, jobs, shared };
+    let handle =
+        RecorderHandle { next: 0, answered: Some(answered), tap, path, writer: Some(writer) };
+    Ok((handle, alarms))
+}
+
+fn spawn<T: Send + 'static>(
+    name: &str,
+    body: impl FnOnce() -> T + Send + 'static,
+) -> Result<JoinHandle<T>, RecordError> {
+    std::thread::Builder::new()
+        .name(name.to_string())
+        .spawn(body)
+        .map_err(|error| RecordError(format!("cannot start the {name} thread: {error}")))
+}
+
+impl Recorder for RecorderHandle {
+    fn record(&mut self, now: Stamp, event: &Event, step: &Step) -> Result<(), RecordError> {
+        let shared = &self.tap.shared;
+        if let Some(why) = shared.failure() {
+            return Err(why.clone());
+        }
+        let item = Answered { n: self.next, now, event: event.clone(), step: step.clone() };
+        match self.answered.as_ref().map(|answered| answered.try_send(item)) {
+            Some(Ok(())) => {
+                self.next += 1;
+                Ok(())
+            }
+            Some(Err(TrySendError::Full(_))) => Err(shared.fail(RecordError(format!(
+                "the disk does not keep up: event {} finds the queue full",
+                self.next
+            )))),
+            Some(Err(TrySendError::Disconnected(_))) | None => {
+                Err(shared.fail(RecordError("the recorder has ended".to_string())))
+            }
+        }
+    }
+}
+
+impl RecorderHandle {
+    /// As [`FrameTap::frame`].
+    pub fn frame(&self, frame: Arc<Frame>) {
+        self.tap.frame(frame);
+    }
+
+    /// A way to give frames from another thread.
+    pub fn frames(&self) -> FrameTap {
+        self.tap.clone()
+    }
+
+    /// Frames that have been dropped so far.
+    pub fn frames_dropped(&self) -> u64 {
+        self.tap.shared.frames_dropped.load(Ordering::Relaxed)
+    }
+
+    /// Writes what has been taken, ends the file and gives it its final name.
+    /// Waits for the disk.
+    pub fn finish(mut self) -> Result<RecordReport, Box<Incomplete>> {
+        let report = self.close().unwrap_or_else(|| {
+            self.tap.shared.fail(RecordError("the recorder broke off".to_string()));
+            RecordReport {
+                events: 0,
+                steps: 0,
+                frames_kept: 0,
+                frames_dropped: self.frames_dropped(),
+                bytes: 0,
+                path: self.path.clone(),
+            }
+        });
+        match self.tap.shared.failure() {
+            None => Ok(report),
+            Some(why) => Err(Box::new(Incomplete { why: why.clone(), report })),
+        }
+    }
+
+    /// Frames first, so that those under way are still written; then events,
+    /// whose end is the writer's.
+    fn close(&mut self) -> Option<RecordReport> {
+        let writer = self.writer.take()?;
+        // An encoder that has already ended needs no telling.
+        self.tap.jobs.send(FrameJob::Close).unwrap_or_default();
+        self.answered = None;
+        writer.join().ok()
+    }
+}
+
+impl Drop for RecorderHandle {
+    fn drop(&mut self) {
+        self.close();
+    }
+}

@@ -1,0 +1,60 @@
+//! Turns frames into PNG within `foxglove.CompressedImage`, in a thread of its
+//! own, so that an event never waits for a picture.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use crossbeam_channel::{Receiver, Sender};
+use prost::Message as _;
+
+use super::Shared;
+use crate::frame::Frame;
+use crate::io::foxglove::{CompressedImage, timestamp};
+use crate::io::image_file::{EncodeError, encode_png};
+use crate::time::Stamp;
+
+/// What the encoder is given.
+pub enum FrameJob {
+    /// Encode this.
+    Encode(Arc<Frame>),
+    /// No more will come.
+    Close,
+}
+
+/// A frame ready to be written.
+pub struct EncodedFrame {
+    /// Number of the frame.
+    pub seq: u64,
+    /// When it was captured.
+    pub captured_at: Stamp,
+    /// The protobuf message.
+    pub message: Vec<u8>,
+}
+
+/// Encodes until told to close or until nobody takes the result.
+pub fn run(jobs: &Receiver<FrameJob>, out: &Sender<EncodedFrame>, epoch_ns: u64, shared: &Shared) {
+    while let Ok(FrameJob::Encode(frame)) = jobs.recv() {
+        match encode(&frame, epoch_ns) {
+            Ok(encoded) => {
+                if out.send(encoded).is_err() {
+                    return;
+                }
+            }
+            Err(error) => {
+                tracing::warn!("frame {} is not recorded: {error}", frame.seq);
+                shared.frames_dropped.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+    }
+}
+
+fn encode(frame: &Frame, epoch_ns: u64) -> Result<EncodedFrame, EncodeError> {
+    let image = CompressedImage {
+        timestamp: Some(timestamp(epoch_ns.saturating_add(frame.captured_at.ns()))),
+        frame_id: "camera".to_string(),
+        data: encode_png(frame)?,
+        format: "png".to_string(),
+    };
+    let message = image.encode_to_vec();
+    Ok(EncodedFrame { seq: frame.seq, captured_at: frame.captured_at, message })
+}

@@ -1,0 +1,123 @@
+//! What is where in a recording: topics, schemas, metadata and attachments.
+//! The recorder and the reader share it.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::control::{Event, Step};
+
+/// Version of this layout. A reader refuses a newer one.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// Events, as JSON.
+pub const EVENT_TOPIC: &str = "/truebead/event";
+/// Steps, as JSON.
+pub const STEP_TOPIC: &str = "/truebead/step";
+/// Frames, as protobuf `foxglove.CompressedImage`.
+pub const IMAGE_TOPIC: &str = "/camera/image";
+/// Metadata record about the run.
+pub const RUN_METADATA: &str = "run";
+/// Attachment that holds the cell file.
+pub const CELL_ATTACHMENT: &str = "cell.toml";
+/// Attachment that holds the calibration file.
+pub const CALIBRATION_ATTACHMENT: &str = "calibration.toml";
+/// Name of a recording that is finished.
+pub const FILE_NAME: &str = "recording.mcap";
+/// Name of a recording that is being written, or was cut short.
+pub const PARTIAL_NAME: &str = "recording.mcap.partial";
+
+/// JSON schema of [`EVENT_TOPIC`].
+pub const EVENT_SCHEMA: &str = include_str!("event.schema.json");
+/// JSON schema of [`STEP_TOPIC`].
+pub const STEP_SCHEMA: &str = include_str!("step.schema.json");
+
+/// A message on [`EVENT_TOPIC`].
+#[derive(Debug, Serialize)]
+pub struct EventMessage<'a> {
+    /// Counts the events of the run from 0.
+    pub n: u64,
+    /// When the controller was told \[ns since the run began\].
+    pub now_ns: u64,
+    /// What it was told.
+    pub event: &'a Event,
+}
+
+/// A message on [`STEP_TOPIC`].
+#[derive(Debug, Serialize)]
+pub struct StepMessage<'a> {
+    /// Number of the event that this answers.
+    pub n: u64,
+    /// When the controller was told \[ns since the run began\].
+    pub now_ns: u64,
+    /// Name of the state after it, where a viewer finds it.
+    pub state: &'static str,
+    /// What it answered.
+    pub step: &'a Step,
+}
+
+/// A message on [`EVENT_TOPIC`], as read.
+#[derive(Debug, Deserialize)]
+pub struct EventRow {
+    /// See [`EventMessage`].
+    pub n: u64,
+    /// See [`EventMessage`].
+    pub now_ns: u64,
+    /// See [`EventMessage`].
+    pub event: Event,
+}
+
+/// A message on [`STEP_TOPIC`], as read.
+#[derive(Debug, Deserialize)]
+pub struct StepRow {
+    /// See [`StepMessage`].
+    pub n: u64,
+    /// See [`StepMessage`].
+    pub now_ns: u64,
+    /// See [`StepMessage`].
+    pub step: Step,
+}
+
+/// What a recording says of its run.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunInfo {
+    /// Layout of the recording.
+    pub format_version: u32,
+    /// Version of the program that wrote it.
+    pub program_version: String,
+    /// Wall clock at stamp 0 \[ns since 1970\].
+    pub epoch_ns: u64,
+    /// The cell file as the command named it.
+    pub cell_name: String,
+}
+
+impl RunInfo {
+    /// As the metadata record [`RUN_METADATA`].
+    pub fn to_metadata(&self) -> BTreeMap<String, String> {
+        [
+            ("format_version", self.format_version.to_string()),
+            ("program", "truebead".to_string()),
+            ("program_version", self.program_version.clone()),
+            ("epoch_ns", self.epoch_ns.to_string()),
+            ("cell_file", self.cell_name.clone()),
+        ]
+        .into_iter()
+        .map(|(key, value)| (key.to_string(), value))
+        .collect()
+    }
+
+    /// From the metadata record; `Ok(None)` where another program wrote it.
+    /// Fails on what is missing, with the key's name.
+    pub fn from_metadata(map: &BTreeMap<String, String>) -> Result<Option<Self>, &'static str> {
+        if map.get("program").map(String::as_str) != Some("truebead") {
+            return Ok(None);
+        }
+        let text = |key| map.get(key).cloned().ok_or(key);
+        Ok(Some(Self {
+            format_version: text("format_version")?.parse().map_err(|_| "format_version")?,
+            program_version: text("program_version")?,
+            epoch_ns: text("epoch_ns")?.parse().map_err(|_| "epoch_ns")?,
+            cell_name: text("cell_file")?,
+        }))
+    }
+}

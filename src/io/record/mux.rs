@@ -1,0 +1,190 @@
+//! Puts events, steps and frames into MCAP, in memory: what comes out is bytes
+//! that end with a whole record, for an outlet that may fail and try again.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use ::mcap::records::{MessageHeader, Metadata};
+use ::mcap::write::NoSeek;
+use ::mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
+
+use super::encode::EncodedFrame;
+use super::format::{
+    CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, EVENT_SCHEMA, EVENT_TOPIC, EventMessage, IMAGE_TOPIC,
+    RUN_METADATA, RunInfo, STEP_SCHEMA, STEP_TOPIC, StepMessage,
+};
+use super::{Answered, Counts};
+use crate::io::foxglove;
+use crate::time::Stamp;
+
+/// Bytes of a chunk before compression; the flush period usually ends a chunk
+/// sooner.
+const CHUNK_BYTES: u64 = 1 << 20;
+
+/// Why a record could not be made. Memory does not fail; what is left is a
+/// value that has no JSON form.
+#[derive(Debug, thiserror::Error)]
+pub enum MuxError {
+    /// The MCAP writer refused.
+    #[error("MCAP: {0}")]
+    Mcap(#[from] McapError),
+    /// A value has no JSON form.
+    #[error("JSON: {0}")]
+    Json(#[from] serde_json::Error),
+}
+
+/// Bytes that the MCAP writer has given out.
+#[derive(Debug, Clone, Default)]
+struct Shelf(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Shelf {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Channels {
+    event: u16,
+    step: u16,
+    image: u16,
+}
+
+/// The MCAP writer and its channels.
+pub struct Mux {
+    writer: Writer<NoSeek<Shelf>>,
+    shelf: Shelf,
+    channels: Channels,
+    epoch_ns: u64,
+    counts: Counts,
+    flushed: Counts,
+}
+
+impl Mux {
+    /// Writes the head of a recording: run, cell, calibration, channels. The
+    /// channels are in a small chunk of their own, so that damage further on
+    /// does not make later messages unreadable.
+    pub fn new(run: &RunInfo, cell: &str, calibration: Option<&str>) -> Result<Self, MuxError> {
+        let shelf = Shelf::default();
+        let mut writer = WriteOptions::new()
+            .library(concat!("truebead ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Zstd))
+            .compression_level(1)
+            .compression_threads(0)
+            .chunk_size(Some(CHUNK_BYTES))
+            .disable_seeking(true)
+            .create(NoSeek::new(shelf.clone()))?;
+        writer.write_metadata(&Metadata {
+            name: RUN_METADATA.to_string(),
+            metadata: run.to_metadata(),
+        })?;
+        let attachments = [(CELL_ATTACHMENT, Some(cell)), (CALIBRATION_ATTACHMENT, calibration)];
+        for (name, text) in attachments {
+            let Some(text) = text else { continue };
+            writer.attach(&Attachment {
+                log_time: run.epoch_ns,
+                create_time: run.epoch_ns,
+                name: name.to_string(),
+                media_type: "application/toml".to_string(),
+                data: Cow::Borrowed(text.as_bytes()),
+            })?;
+        }
+        let channels = add_channels(&mut writer)?;
+        writer.flush()?;
+        Ok(Self {
+            writer,
+            shelf,
+            channels,
+            epoch_ns: run.epoch_ns,
+            counts: Counts::default(),
+            flushed: Counts::default(),
+        })
+    }
+
+    /// Adds an event and the step that answered it.
+    pub fn answered(&mut self, item: &Answered) -> Result<(), MuxError> {
+        let (n, now_ns) = (item.n, item.now.ns());
+        let event = serde_json::to_vec(&EventMessage { n, now_ns, event: &item.event })?;
+        let state = item.step.state.name();
+        let step = serde_json::to_vec(&StepMessage { n, now_ns, state, step: &item.step })?;
+        self.message(self.channels.event, n, item.now, &event)?;
+        self.counts.events += 1;
+        self.message(self.channels.step, n, item.now, &step)?;
+        self.counts.steps += 1;
+        Ok(())
+    }
+
+    /// Adds a frame.
+    pub fn frame(&mut self, frame: &EncodedFrame) -> Result<(), MuxError> {
+        self.message(self.channels.image, frame.seq, frame.captured_at, &frame.message)?;
+        self.counts.frames += 1;
+        Ok(())
+    }
+
+    /// Ends the chunk, so that everything so far comes out of [`Self::take`].
+    pub fn flush(&mut self) -> Result<(), MuxError> {
+        self.writer.flush()?;
+        self.flushed = self.counts;
+        Ok(())
+    }
+
+    /// Ends the recording with its index.
+    pub fn finish(&mut self) -> Result<(), MuxError> {
+        self.writer.finish()?;
+        self.flushed = self.counts;
+        Ok(())
+    }
+
+    /// Moves what has been written to the end of `bytes`; it ends with a whole
+    /// record.
+    pub fn take(&mut self, bytes: &mut Vec<u8>) {
+        bytes.append(&mut self.shelf.0.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    /// What has been added up to the last [`Self::flush`] or
+    /// [`Self::finish`]. Chunks that ended in between hold more.
+    pub fn flushed_counts(&self) -> Counts {
+        self.flushed
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "MCAP counts messages modulo 2^32")]
+    fn message(
+        &mut self,
+        channel: u16,
+        number: u64,
+        at: Stamp,
+        data: &[u8],
+    ) -> Result<(), MuxError> {
+        let wall_ns = self.epoch_ns.saturating_add(at.ns());
+        let header = MessageHeader {
+            channel_id: channel,
+            sequence: number as u32,
+            log_time: wall_ns,
+            publish_time: wall_ns,
+        };
+        Ok(self.writer.write_to_known_channel(&header, data)?)
+    }
+}
+
+fn add_channels(writer: &mut Writer<NoSeek<Shelf>>) -> Result<Channels, McapError> {
+    let none = BTreeMap::new();
+    let event = writer.add_schema("truebead.Event", "jsonschema", EVENT_SCHEMA.as_bytes())?;
+    let step = writer.add_schema("truebead.Step", "jsonschema", STEP_SCHEMA.as_bytes())?;
+    let image = writer.add_schema(
+        foxglove::COMPRESSED_IMAGE,
+        "protobuf",
+        &foxglove::compressed_image_schema(),
+    )?;
+    Ok(Channels {
+        event: writer.add_channel(event, EVENT_TOPIC, "json", &none)?,
+        step: writer.add_channel(step, STEP_TOPIC, "json", &none)?,
+        image: writer.add_channel(image, IMAGE_TOPIC, "protobuf", &none)?,
+    })
+}

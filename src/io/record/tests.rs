@@ -1,0 +1,336 @@
+use std::io::Cursor;
+
+use super::*;
+use crate::control::{RobotLimits, RobotMode, RobotState, State, Trace};
+use crate::frame::{Channel, Pixels};
+use crate::io::image_file;
+use crate::io::recording::{Entry, Recording};
+use crate::units::{Mm, MmPerS};
+
+mod disk;
+
+use disk::Disk;
+
+const EPOCH_NS: u64 = 1_763_683_200_000_000_000;
+
+fn config() -> RecordConfig {
+    RecordConfig {
+        frames: KeepFrames::Every(1),
+        epoch_ns: EPOCH_NS,
+        cell_name: "cells/a.toml".into(),
+        cell_text: "[control]\ntarget_width_mm = 42.0\n".into(),
+        calibration_text: Some("version = 1\n".into()),
+    }
+}
+
+fn quick() -> Tuning {
+    Tuning { flush_every: Duration::from_millis(5), ..Tuning::default() }
+}
+
+fn event(n: u64) -> Event {
+    Event::Rejected { frame: n, captured_at: Stamp::from_ns(n), reason: "no_pair".into() }
+}
+
+fn frame(seq: u64) -> Arc<Frame> {
+    let pixels = (0..48).map(|at| u8::try_from((at * 5 + seq) % 256).unwrap()).collect();
+    Arc::new(Frame::new(seq, Stamp::from_ns(seq * 1000), (8, 6), Pixels::Grey8(pixels)).unwrap())
+}
+
+fn read(bytes: Vec<u8>) -> Recording {
+    Recording::read(Cursor::new(bytes), "test.mcap".into()).unwrap()
+}
+
+fn event_numbers(recording: &mut Recording) -> Vec<u64> {
+    let entries = recording.map(Result::unwrap);
+    entries
+        .filter_map(|entry| if let Entry::Event { n, .. } = entry { Some(n) } else { None })
+        .collect()
+}
+
+fn awkward_floats() -> Vec<f64> {
+    vec![
+        0.1,
+        -0.0,
+        1.0 / 3.0,
+        5e-324,
+        f64::MIN_POSITIVE,
+        f64::MAX,
+        f64::MIN,
+        9_007_199_254_740_993.0,
+        1e23,
+        0.1 + 0.2,
+        112.499_999_999_999_99,
+        2.225_073_858_507_201e-308,
+    ]
+}
+
+#[test]
+fn every_number_comes_back_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut recorder, _alarms) = start(&config(), folder.path()).unwrap();
+    let floats = awkward_floats();
+    for (n, &value) in floats.iter().enumerate() {
+        let event = Event::Measured {
+            frame: u64::MAX - n as u64,
+            captured_at: Stamp::from_ns(u64::MAX),
+            width_mm: Mm::constant(value),
+            sigma_mm: Mm::constant(-value),
+        };
+        let trace = Trace {
+            error_mm: Some(Mm::constant(value)),
+            demand_mm_per_s: Some(MmPerS::constant(-value)),
+            ..Trace::default()
+        };
+        let step = Step { state: State::Tracking, trace, ..Step::default() };
+        recorder.record(Stamp::from_ns(n as u64), &event, &step).unwrap();
+    }
+    let path = recorder.finish().unwrap().path;
+    let mut widths = Vec::new();
+    let mut demands = Vec::new();
+    for entry in Recording::open(&path).unwrap() {
+        match entry.unwrap() {
+            Entry::Event { event: Event::Measured { frame, width_mm, .. }, n, .. } => {
+                assert_eq!(frame, u64::MAX - n);
+                widths.push(width_mm.get().to_bits());
+            }
+            Entry::Step { step, .. } => {
+                demands.push(step.trace.demand_mm_per_s.unwrap().get().to_bits());
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+    assert_eq!(widths, floats.iter().map(|value| value.to_bits()).collect::<Vec<_>>());
+    assert_eq!(demands, floats.iter().map(|value| (-value).to_bits()).collect::<Vec<_>>());
+}
+
+#[test]
+fn every_kind_of_event_comes_back_and_is_described_by_the_schema() {
+    let schema: serde_json::Value = serde_json::from_str(format::EVENT_SCHEMA).unwrap();
+    let known = schema["properties"]["event"]["properties"].as_object().unwrap();
+    let state = RobotState {
+        t_ms: 1,
+        seq: 2,
+        mode: RobotMode::Print,
+        speed_mm_per_s: MmPerS::constant(112.5),
+        path_mm: Mm::constant(3.25),
+        z_mm: Mm::constant(20.0),
+    };
+    let robot = RobotLimits {
+        name: "sim".into(),
+        min_mm_per_s: MmPerS::ZERO,
+        max_mm_per_s: MmPerS::constant(150.0),
+        hold_mm_per_s: MmPerS::constant(60.0),
+    };
+    let measured = Event::Measured {
+        frame: 0,
+        captured_at: Stamp::START,
+        width_mm: Mm::ZERO,
+        sigma_mm: Mm::ZERO,
+    };
+    let events = [
+        measured,
+        event(3),
+        Event::Robot(state),
+        Event::LinkUp { robot },
+        Event::LinkDown { reason: "gone \"away\"\n".into() },
+        Event::Refused { seq: 4, code: "STALE".into() },
+        Event::Tick,
+        Event::CameraLost { reason: "ü".into() },
+        Event::RecordingLost,
+        Event::Stop,
+    ];
+    let disk = Disk::default();
+    let (mut recorder, _alarms) = start_with(&config(), disk.clone(), quick()).unwrap();
+    for (n, event) in (0u64..).zip(&events) {
+        let json = serde_json::to_value(event).unwrap();
+        for key in json.as_object().unwrap().keys() {
+            assert!(known.contains_key(key), "{key} is not in the schema");
+        }
+        recorder.record(Stamp::from_ns(n), event, &Step::default()).unwrap();
+    }
+    recorder.finish().unwrap();
+    let back = read(disk.bytes()).map(Result::unwrap).filter_map(|entry| match entry {
+        Entry::Event { event, .. } => Some(event),
+        _ => None,
+    });
+    assert_eq!(back.collect::<Vec<_>>(), events);
+}
+
+#[test]
+fn the_step_schema_names_what_a_trace_holds() {
+    let schema: serde_json::Value = serde_json::from_str(format::STEP_SCHEMA).unwrap();
+    let known = &schema["properties"]["step"]["properties"]["trace"]["properties"];
+    let trace = Trace {
+        frame: Some(1),
+        captured_at: Some(Stamp::START),
+        bead_path_mm: Some(Mm::ZERO),
+        nozzle_path_mm: Some(Mm::ZERO),
+        error_mm: Some(Mm::ZERO),
+        proportional_mm_per_s: Some(MmPerS::ZERO),
+        integral_mm_per_s: Some(MmPerS::ZERO),
+        demand_mm_per_s: Some(MmPerS::ZERO),
+        ..Trace::default()
+    };
+    let json = serde_json::to_value(trace).unwrap();
+    assert!(json.as_object().unwrap().keys().eq(known.as_object().unwrap().keys()));
+}
+
+#[test]
+fn a_recording_stands_alone_and_has_its_final_name_only_when_finished() {
+    let folder = tempfile::tempdir().unwrap();
+    let partial = folder.path().join(format::PARTIAL_NAME);
+    let finished = folder.path().join(format::FILE_NAME);
+    let (mut recorder, _alarms) = start(&config(), folder.path()).unwrap();
+    recorder.record(Stamp::START, &event(0), &Step::default()).unwrap();
+    assert!(partial.exists() && !finished.exists());
+    let busy = start(&config(), folder.path()).err().unwrap();
+    assert!(busy.0.contains("recording.mcap.partial"), "{busy}");
+    let report = recorder.finish().unwrap();
+    assert!(!partial.exists() && report.path == finished);
+    assert_eq!(report.bytes, finished.metadata().unwrap().len());
+    let taken = start(&config(), folder.path()).err().unwrap();
+    assert!(taken.0.contains("not overwritten"), "{taken}");
+
+    let recording = Recording::open(&finished).unwrap();
+    let run = recording.run().unwrap();
+    assert_eq!((run.epoch_ns, run.cell_name.as_str()), (EPOCH_NS, "cells/a.toml"));
+    assert_eq!(recording.cell(), Some("[control]\ntarget_width_mm = 42.0\n"));
+    assert_eq!(recording.calibration(), Some("version = 1\n"));
+}
+
+#[test]
+fn a_handle_that_is_dropped_finishes_its_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut recorder, _alarms) = start(&config(), folder.path()).unwrap();
+    recorder.record(Stamp::START, &event(0), &Step::default()).unwrap();
+    drop(recorder);
+    let mut recording = Recording::open(&folder.path().join(format::FILE_NAME)).unwrap();
+    assert_eq!(event_numbers(&mut recording), [0]);
+    assert!(recording.integrity().is_whole());
+}
+
+#[test]
+fn frames_of_both_depths_are_kept_without_loss() {
+    let deep = Pixels::Grey16(vec![0, 1, 255, 256, 4095, 65535]);
+    let deep = Arc::new(Frame::new(2, Stamp::from_ns(77), (3, 2), deep).unwrap());
+    let disk = Disk::default();
+    let config = RecordConfig { frames: KeepFrames::Every(2), ..config() };
+    let (recorder, _alarms) = start_with(&config, disk.clone(), quick()).unwrap();
+    for given in [frame(0), frame(1), Arc::clone(&deep)] {
+        recorder.frame(given);
+    }
+    let report = recorder.finish().unwrap();
+    assert_eq!((report.frames_kept, report.frames_dropped), (2, 0));
+    let mut back = Vec::new();
+    for entry in read(disk.bytes()) {
+        let Entry::Frame(message) = entry.unwrap() else { panic!("only frames were given") };
+        let image: crate::io::foxglove::CompressedImage =
+            prost::Message::decode(message.data.as_slice()).unwrap();
+        assert_eq!(image.format, "png");
+        let ns = crate::io::foxglove::timestamp_ns(image.timestamp.as_ref()).unwrap();
+        assert_eq!(ns, message.log_time_ns);
+        let at = Stamp::from_ns(ns - EPOCH_NS);
+        let seq = u64::from(message.sequence);
+        back.push(image_file::decode(&image.data, Channel::Grey, seq, at).unwrap());
+    }
+    assert_eq!(back, [frame(0).as_ref().clone(), deep.as_ref().clone()]);
+}
+
+#[test]
+fn a_full_disk_ends_the_recording_and_leaves_a_beginning_that_reads_back() {
+    let disk = Disk::with_room(6000);
+    let (mut recorder, alarms) = start_with(&config(), disk.clone(), quick()).unwrap();
+    let mut taken = 0;
+    let why = loop {
+        match recorder.record(Stamp::from_ns(taken), &event(taken), &Step::default()) {
+            Ok(()) => taken += 1,
+            Err(why) => break why,
+        }
+        disk.wait_for_a_write();
+    };
+    assert!(why.0.contains("disk.mcap") && why.0.contains("full"), "{why}");
+    assert_eq!(alarms.recv().unwrap(), why);
+    recorder.record(Stamp::from_ns(taken), &event(taken), &Step::default()).unwrap_err();
+    let incomplete = recorder.finish().unwrap_err();
+    assert_eq!(incomplete.why, why);
+    assert!(!disk.published());
+
+    let mut recording = read(disk.bytes());
+    let numbers = event_numbers(&mut recording);
+    assert_eq!(numbers, (0..incomplete.report.events).collect::<Vec<_>>());
+    assert!(!numbers.is_empty() && numbers.len() as u64 <= taken);
+    assert_eq!(recording.integrity().lost_bytes, 0, "the file ends with a whole record");
+}
+
+#[test]
+fn a_disk_that_recovers_gets_what_was_taken_and_a_proper_end() {
+    let disk = Disk::with_room(3000);
+    let (mut recorder, alarms) = start_with(&config(), disk.clone(), quick()).unwrap();
+    let mut taken = 0;
+    while recorder.record(Stamp::from_ns(taken), &event(taken), &Step::default()).is_ok() {
+        taken += 1;
+        disk.wait_for_a_write();
+    }
+    alarms.recv().unwrap();
+    disk.make_room();
+    let incomplete = recorder.finish().unwrap_err();
+    assert_eq!(incomplete.report.events, taken);
+    assert!(!disk.published(), "the end of the run is still missing");
+    let mut recording = read(disk.bytes());
+    assert_eq!(event_numbers(&mut recording).len() as u64, taken);
+    assert!(recording.integrity().is_whole());
+}
+
+#[test]
+fn a_slow_disk_costs_frames_but_no_event() {
+    let disk = Disk::default();
+    let (mut recorder, _alarms) = start_with(&config(), disk.clone(), quick()).unwrap();
+    disk.stall();
+    for n in 0..500 {
+        recorder.record(Stamp::from_ns(n), &event(n), &Step::default()).unwrap();
+        recorder.frame(frame(n));
+    }
+    let dropped = recorder.frames_dropped();
+    disk.go_on();
+    let report = recorder.finish().unwrap();
+    assert!(dropped > 0);
+    assert_eq!((report.events, report.steps), (500, 500));
+    assert_eq!(report.frames_kept + report.frames_dropped, 500);
+    assert_eq!(event_numbers(&mut read(disk.bytes())), (0..500).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_disk_that_stands_still_ends_control_and_loses_nothing_that_was_taken() {
+    let disk = Disk::default();
+    let tuning = Tuning { events: 16, ..quick() };
+    let (mut recorder, alarms) = start_with(&config(), disk.clone(), tuning).unwrap();
+    disk.stall();
+    let mut taken = 0;
+    while recorder.record(Stamp::from_ns(taken), &event(taken), &Step::default()).is_ok() {
+        taken += 1;
+        if taken == 16 {
+            disk.wait_until_stalled();
+        }
+    }
+    assert!(alarms.recv().unwrap().0.contains("does not keep up"));
+    disk.go_on();
+    let incomplete = recorder.finish().unwrap_err();
+    assert_eq!(incomplete.report.events, taken);
+    assert_eq!(event_numbers(&mut read(disk.bytes())), (0..taken).collect::<Vec<_>>());
+}
+
+#[test]
+fn what_is_taken_reaches_the_disk_without_further_events() {
+    let disk = Disk::default();
+    let (mut recorder, _alarms) = start_with(&config(), disk.clone(), quick()).unwrap();
+    disk.forget_writes();
+    recorder.record(Stamp::START, &event(0), &Step::default()).unwrap();
+    disk.wait_for_a_write();
+    let so_far = disk.bytes();
+    assert_eq!(event_numbers(&mut read(so_far)), [0]);
+}
+
+#[test]
+fn the_flush_period_is_within_half_a_second() {
+    assert!(Tuning::default().flush_every < Duration::from_millis(500));
+}

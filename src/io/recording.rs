@@ -1,0 +1,271 @@
+//! Reads recordings back: finished or cut short, this program's or another's.
+//! A recording is read from its beginning to its end, a chunk at a time, so
+//! that one of many gigabytes needs no more memory than a short one.
+
+mod chunk;
+pub mod messages;
+pub mod stream;
+pub mod summary;
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek};
+use std::path::Path;
+
+use messages::{Item, Message, Messages, Topic};
+pub use stream::Integrity;
+
+use super::record::format::{
+    CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, EVENT_TOPIC, EventRow, FORMAT_VERSION, IMAGE_TOPIC,
+    RUN_METADATA, RunInfo, STEP_TOPIC, StepRow,
+};
+use crate::control::{Event, Step};
+use crate::time::Stamp;
+
+/// Bytes that are read ahead.
+const BUFFER_BYTES: usize = 1 << 16;
+
+/// Why a recording cannot be read, or not on.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// It cannot be opened or read.
+    #[error("{file}: {source}")]
+    Io {
+        /// The file.
+        file: String,
+        /// Why.
+        source: io::Error,
+    },
+    /// It is something else.
+    #[error(
+        "{file}: not an MCAP file (it does not begin with the MCAP magic bytes); expected a \
+         recording such as recording.mcap"
+    )]
+    NotMcap {
+        /// The file.
+        file: String,
+    },
+    /// It was written by a later version.
+    #[error(
+        "{file}: written by truebead {program} in format {found}; this version reads up to format \
+         {known}, use truebead {program} or later"
+    )]
+    Newer {
+        /// The file.
+        file: String,
+        /// Version of the program that wrote it.
+        program: String,
+        /// Format that was found.
+        found: u32,
+        /// Latest format that is known.
+        known: u32,
+    },
+    /// What it says of its run is incomplete.
+    #[error("{file}: the metadata record \"run\" has no valid {key}")]
+    BadRun {
+        /// The file.
+        file: String,
+        /// The key that is missing or wrong.
+        key: &'static str,
+    },
+    /// A message is not what its topic promises.
+    #[error("{file}: message {sequence} of {topic}: {what}")]
+    BadMessage {
+        /// The file.
+        file: String,
+        /// The topic.
+        topic: String,
+        /// Number of the message.
+        sequence: u32,
+        /// What is wrong.
+        what: String,
+    },
+}
+
+/// Something that was recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Entry {
+    /// What the controller was told.
+    Event {
+        /// Counts the events of the run from 0.
+        n: u64,
+        /// When it was told.
+        now: Stamp,
+        /// What.
+        event: Event,
+    },
+    /// What it answered.
+    Step {
+        /// Number of the event.
+        n: u64,
+        /// When it was told.
+        now: Stamp,
+        /// What it answered.
+        step: Step,
+    },
+    /// A frame, still encoded as `foxglove.CompressedImage`.
+    Frame(Message),
+}
+
+trait ReadSeek: Read + Seek + Send {}
+impl<T: Read + Seek + Send> ReadSeek for T {}
+
+/// A recording that is being read: an iterator over its entries. Messages of
+/// other programs are passed over.
+pub struct Recording {
+    file: String,
+    messages: Messages<Box<dyn ReadSeek>>,
+    first: Option<Message>,
+    run: Option<RunInfo>,
+    attachments: BTreeMap<String, Vec<u8>>,
+}
+
+impl Recording {
+    /// Opens a file and reads what stands before its first message: the run
+    /// and the attachments.
+    pub fn open(path: &Path) -> Result<Self, RecordingError> {
+        let file = path.display().to_string();
+        let opened = File::open(path).and_then(|opened| {
+            if opened.metadata()?.is_dir() {
+                return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder"));
+            }
+            Ok(opened)
+        });
+        match opened {
+            Ok(opened) => Self::read(BufReader::with_capacity(BUFFER_BYTES, opened), file),
+            Err(source) => Err(RecordingError::Io { file, source }),
+        }
+    }
+
+    /// As [`Self::open`], from anywhere; `file` is what messages call it.
+    pub fn read(
+        source: impl Read + Seek + Send + 'static,
+        file: String,
+    ) -> Result<Self, RecordingError> {
+        let source: Box<dyn ReadSeek> = Box::new(source);
+        let messages = match Messages::new(source) {
+            Ok(Some(messages)) => messages,
+            Ok(None) => return Err(RecordingError::NotMcap { file }),
+            Err(source) => return Err(RecordingError::Io { file, source }),
+        };
+        let attachments = BTreeMap::new();
+        let mut recording = Self { file, messages, first: None, run: None, attachments };
+        recording.first = recording.next_message()?;
+        Ok(recording)
+    }
+
+    /// What the recording says of its run; `None` where another program wrote
+    /// it.
+    pub fn run(&self) -> Option<&RunInfo> {
+        self.run.as_ref()
+    }
+
+    /// The cell file's text, if it is attached.
+    pub fn cell(&self) -> Option<&str> {
+        self.attachment(CELL_ATTACHMENT)
+    }
+
+    /// The calibration file's text, if it is attached.
+    pub fn calibration(&self) -> Option<&str> {
+        self.attachment(CALIBRATION_ATTACHMENT)
+    }
+
+    fn attachment(&self, name: &str) -> Option<&str> {
+        self.attachments.get(name).and_then(|data| std::str::from_utf8(data).ok())
+    }
+
+    /// The file as messages call it.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// The topics that have been met so far, by name.
+    pub fn topics(&self) -> Vec<std::sync::Arc<Topic>> {
+        self.messages.topics()
+    }
+
+    /// What is missing or damaged, as far as the file has been read; complete
+    /// once the entries have come to their end.
+    pub fn integrity(&self) -> &Integrity {
+        self.messages.integrity()
+    }
+
+    /// The next message of any topic, `None` at the end.
+    pub fn next_message(&mut self) -> Result<Option<Message>, RecordingError> {
+        if let Some(first) = self.first.take() {
+            return Ok(Some(first));
+        }
+        loop {
+            let item = self.messages.next_item();
+            match item.map_err(|source| RecordingError::Io { file: self.file.clone(), source })? {
+                None => return Ok(None),
+                Some(Item::Message(message)) => return Ok(Some(message)),
+                Some(Item::Attachment { name, data }) => {
+                    self.attachments.entry(name).or_insert(data);
+                }
+                Some(Item::Metadata(metadata)) if metadata.name == RUN_METADATA => {
+                    self.take_run(&metadata.metadata)?;
+                }
+                Some(Item::Metadata(_)) => {}
+            }
+        }
+    }
+
+    fn take_run(&mut self, metadata: &BTreeMap<String, String>) -> Result<(), RecordingError> {
+        let file = self.file.clone();
+        let run = match RunInfo::from_metadata(metadata) {
+            Ok(Some(run)) => run,
+            Ok(None) => return Ok(()),
+            Err(key) => return Err(RecordingError::BadRun { file, key }),
+        };
+        if run.format_version > FORMAT_VERSION {
+            let (program, found) = (run.program_version, run.format_version);
+            return Err(RecordingError::Newer { file, program, found, known: FORMAT_VERSION });
+        }
+        self.run = Some(run);
+        Ok(())
+    }
+
+    /// What a message says in the terms of this program; `None` for a message
+    /// of another topic.
+    pub fn entry(&self, message: Message) -> Result<Option<Entry>, RecordingError> {
+        let bad = |error: serde_json::Error| RecordingError::BadMessage {
+            file: self.file.clone(),
+            topic: message.topic.name.clone(),
+            sequence: message.sequence,
+            what: error.to_string(),
+        };
+        Ok(match message.topic.name.as_str() {
+            EVENT_TOPIC => {
+                let row: EventRow = serde_json::from_slice(&message.data).map_err(bad)?;
+                Some(Entry::Event { n: row.n, now: Stamp::from_ns(row.now_ns), event: row.event })
+            }
+            STEP_TOPIC => {
+                let row: StepRow = serde_json::from_slice(&message.data).map_err(bad)?;
+                Some(Entry::Step { n: row.n, now: Stamp::from_ns(row.now_ns), step: row.step })
+            }
+            IMAGE_TOPIC => Some(Entry::Frame(message)),
+            _ => None,
+        })
+    }
+}
+
+impl Iterator for Recording {
+    type Item = Result<Entry, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            match self.next_message() {
+                Ok(None) => return None,
+                Err(error) => return Some(Err(error)),
+                Ok(Some(message)) => match self.entry(message).transpose() {
+                    None => {}
+                    entry => return entry,
+                },
+            }
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! Reads MCAP records one after the other from a file that may be cut off or
+//! damaged anywhere. What can be read is given out, what cannot is noted.
+
+use std::collections::VecDeque;
+use std::io::{self, Read, Seek, SeekFrom};
+
+use ::mcap::MAGIC;
+use ::mcap::records::{Record, op};
+
+use super::chunk;
+
+/// Largest record that is taken; a longer one is a damaged length.
+const MAX_RECORD_BYTES: u64 = 1 << 30;
+/// Opcode and length in front of every record.
+const HEAD_BYTES: u64 = 9;
+/// Notes that are kept in words; further ones are only counted.
+const MAX_NOTES: usize = 8;
+
+/// What a reader found wrong with a file.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Integrity {
+    /// The file has its proper end.
+    pub finished: bool,
+    /// Where a file without it breaks off \[bytes\].
+    pub breaks_off_at: Option<u64>,
+    /// Bytes beyond that point that belong to no whole record.
+    pub lost_bytes: u64,
+    /// Records and chunks in the middle that could not be read and were
+    /// skipped.
+    pub damaged: u64,
+    /// The first few of them, in words, each with its place.
+    pub notes: Vec<String>,
+}
+
+impl Integrity {
+    /// Whether nothing is known to be missing from the middle or the end.
+    pub fn is_whole(&self) -> bool {
+        self.finished && self.damaged == 0
+    }
+
+    /// What is wrong, in a sentence; `None` where nothing is.
+    pub fn summary(&self) -> Option<String> {
+        let mut parts = Vec::new();
+        if let Some(at) = self.breaks_off_at {
+            parts.push(format!(
+                "it was not finished: it breaks off at byte {at}, {} bytes of a record that is \
+                 not whole are left out",
+                self.lost_bytes
+            ));
+        }
+        if self.damaged > 0 {
+            parts.push(format!(
+                "{} damaged parts were skipped ({})",
+                self.damaged,
+                self.notes.join("; ")
+            ));
+        }
+        (!parts.is_empty()).then(|| parts.join("; "))
+    }
+
+    pub(super) fn note(&mut self, what: String) {
+        self.damaged += 1;
+        if self.notes.len() < MAX_NOTES {
+            self.notes.push(what);
+        }
+    }
+}
+
+/// A record with its data owned.
+pub type OwnedRecord = Record<'static>;
+
+/// Records of a file in its order, those of a chunk in its place.
+pub struct RecordStream<R> {
+    source: R,
+    len: u64,
+    at: u64,
+    ended: bool,
+    ready: VecDeque<OwnedRecord>,
+    integrity: Integrity,
+}
+
+impl<R: Read + Seek> RecordStream<R> {
+    /// Begins a file; `Ok(None)` where it does not begin as MCAP does.
+    pub fn new(mut source: R) -> io::Result<Option<Self>> {
+        let len = source.seek(SeekFrom::End(0))?;
+        source.seek(SeekFrom::Start(0))?;
+        let mut magic = Vec::new();
+        source.by_ref().take(MAGIC.len() as u64).read_to_end(&mut magic)?;
+        if magic != MAGIC {
+            return Ok(None);
+        }
+        let at = magic.len() as u64;
+        let ready = VecDeque::new();
+        let integrity = Integrity::default();
+        Ok(Some(Self { source, len, at, ended: false, ready, integrity }))
+    }
+
+    /// The next record of the data section, `None` at its end. Fails only
+    /// when the file cannot be read; a damaged one shows in
+    /// [`Self::integrity`].
+    pub fn next_record(&mut self) -> io::Result<Option<OwnedRecord>> {
+        loop {
+            if let Some(record) = self.ready.pop_front() {
+                return Ok(Some(record));
+            }
+            if self.ended {
+                return Ok(None);
+            }
+            self.read_record()?;
+        }
+    }
+
+    /// What was wrong as far as the file has been read.
+    pub fn integrity(&self) -> &Integrity {
+        &self.integrity
+    }
+
+    /// To note what a record's content shows.
+    pub fn integrity_mut(&mut self) -> &mut Integrity {
+        &mut self.integrity
+    }
+
+    fn read_record(&mut self) -> io::Result<()> {
+        let left = self.len.saturating_sub(self.at);
+        let mut head = Vec::new();
+        self.source.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
+        let Some((&opcode, length)) = head.split_first() else {
+            self.break_off(left);
+            return Ok(());
+        };
+        let Ok(length) = <[u8; 8]>::try_from(length).map(u64::from_le_bytes) else {
+            self.break_off(left);
+            return Ok(());
+        };
+        if opcode == 0 || length > left.saturating_sub(HEAD_BYTES) {
+            self.break_off(left);
+            return Ok(());
+        }
+        let start = self.at;
+        self.at += HEAD_BYTES + length;
+        if length > MAX_RECORD_BYTES {
+            self.integrity.note(format!("a record of {length} bytes at byte {start}"));
+            self.source.seek(SeekFrom::Start(self.at))?;
+            return Ok(());
+        }
+        match opcode {
+            op::DATA_END | op::FOOTER => {
+                self.ended = true;
+                self.integrity.finished = self.ends_with_magic()?;
+                if !self.integrity.finished {
+                    self.integrity.breaks_off_at = Some(self.len);
+                }
+            }
+            op::MESSAGE_INDEX => {
+                self.source.seek_relative(i64::try_from(length).unwrap_or(i64::MAX))?;
+            }
+            _ => {
+                let mut body = Vec::new();
+                self.source.by_ref().take(length).read_to_end(&mut body)?;
+                self.take_record(opcode, &body, start);
+            }
+        }
+        Ok(())
+    }
+
+    fn take_record(&mut self, opcode: u8, body: &[u8], start: u64) {
+        let taken = if opcode == op::CHUNK {
+            chunk::records(body, &mut self.ready)
+        } else {
+            chunk::parse(opcode, body).map(|record| self.ready.push_back(record))
+        };
+        if let Err(what) = taken {
+            let kind = if opcode == op::CHUNK { "chunk" } else { "record" };
+            self.integrity.note(format!("{kind} at byte {start}: {what}"));
+        }
+    }
+
+    /// The summary at a file's end repeats what has been read; only that it
+    /// ends is of interest.
+    fn ends_with_magic(&mut self) -> io::Result<bool> {
+        let magic_at = self.len.saturating_sub(MAGIC.len() as u64);
+        if magic_at < self.at {
+            return Ok(false);
+        }
+        self.source.seek(SeekFrom::Start(magic_at))?;
+        let mut tail = Vec::new();
+        self.source.by_ref().take(MAGIC.len() as u64).read_to_end(&mut tail)?;
+        Ok(tail == MAGIC)
+    }
+
+    fn break_off(&mut self, lost: u64) {
+        self.ended = true;
+        self.integrity.breaks_off_at = Some(self.at);
+        self.integrity.lost_bytes = lost;
+    }
+}
