@@ -2,6 +2,7 @@
 
 pub mod folder;
 pub mod live;
+pub mod mcap;
 pub mod snapshot;
 pub mod video;
 
