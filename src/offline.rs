@@ -11,6 +11,7 @@ pub mod output;
 pub mod picker;
 pub mod picture;
 pub mod progress;
+pub mod replay;
 pub mod report;
 pub mod row;
 pub mod stats;
