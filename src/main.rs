@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use truebead::cli::{WrongArguments, calibrate};
+use truebead::cli::{WrongArguments, calibrate, robot_sim};
 
 /// Keeps an extruded bead at the width that was asked for.
 #[derive(Debug, Parser)]
@@ -16,11 +16,15 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Calibrate(calibrate::CalibrateArgs),
+    RobotSim(robot_sim::RobotSimArgs),
 }
 
 fn main() -> ExitCode {
-    let Command::Calibrate(args) = Cli::parse().command;
-    match calibrate::run(&args) {
+    let done = match Cli::parse().command {
+        Command::Calibrate(args) => calibrate::run(&args),
+        Command::RobotSim(args) => robot_sim::run(&args),
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
