@@ -2,4 +2,8 @@
 
 pub mod bead;
 pub mod disturbance;
+pub mod edge;
+pub mod hash;
+pub mod laid;
 pub mod picture;
+pub mod waviness;
