@@ -1,0 +1,152 @@
+//! The outline of a bead in the picture: both edges, and where it begins and
+//! ends.
+
+use super::view::{Place, View};
+
+/// Half the change of an edge's slope that the sampling steps over is of this
+/// length \[px\].
+const SAMPLE_PX: f64 = 1.0;
+/// Halvings with which an end of the bead is looked for between two samples.
+const HALVINGS: u32 = 30;
+
+/// Signed offsets of the left and the right edge \[mm\] at a distance along
+/// the bead from the middle of the gauge \[mm\]; `None` where there is no bead.
+pub type Bead<'a> = dyn Fn(f64) -> Option<(f64, f64)> + 'a;
+
+/// One place along the bead, and where its edges are seen.
+#[derive(Debug, Clone, Copy)]
+pub struct Sample {
+    /// Distance along the bead \[mm\].
+    pub along_mm: f64,
+    /// Offsets of the left and the right edge \[mm\].
+    pub offset_mm: [f64; 2],
+    /// Where they are seen.
+    pub seen: [Place; 2],
+}
+
+/// Everything that is seen of a bead.
+#[derive(Debug, Clone)]
+pub struct Outline {
+    /// In the order in which `run` grows. Beyond the ends of the bead its
+    /// edges go on straight.
+    pub samples: Vec<Sample>,
+    /// Stretches that have been laid \[mm\], within what is seen.
+    pub stretches: Vec<Stretch>,
+}
+
+/// A stretch of bead between two ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stretch {
+    /// Where it begins \[mm\]; −∞ if before what is seen.
+    pub from_mm: f64,
+    /// Where it ends \[mm\]; +∞ if after what is seen.
+    pub to_mm: f64,
+}
+
+impl Outline {
+    /// Follows the bead through a picture that has `run` pixels along the
+    /// gauge's axis, and `margin` more on either side. `None` without bead in
+    /// sight.
+    pub fn trace(view: &View, bead: &Bead<'_>, run: f64, margin: f64) -> Option<Self> {
+        let step = view.pixel_mm * SAMPLE_PX;
+        let most = (run + 2.0 * margin) * 16.0 / SAMPLE_PX;
+        let walk = |sign: f64| {
+            let mut steps = 0.0;
+            while steps < most {
+                steps += 1.0;
+                let Some(place) = view.px(sign * steps * step, 0.0) else {
+                    return steps - 1.0;
+                };
+                if place.run < -margin || place.run > run + margin {
+                    break;
+                }
+            }
+            steps
+        };
+        let (back, ahead) = (walk(-1.0), walk(1.0));
+        let mut places = Vec::new();
+        let mut count = -back;
+        while count <= ahead {
+            places.push((count * step, bead(count * step)));
+            count += 1.0;
+        }
+        let stretches = stretches(&places, bead);
+        let mut samples: Vec<Sample> = filled(&places)?
+            .filter_map(|(along_mm, (left, right))| {
+                let seen = [view.px(along_mm, left)?, view.px(along_mm, right)?];
+                Some(Sample { along_mm, offset_mm: [left, right], seen })
+            })
+            .collect();
+        if view.run_sign() < 0.0 {
+            samples.reverse();
+        }
+        Some(Self { samples, stretches })
+    }
+
+    /// Where an edge (0 left, 1 right) crosses a line across the gauge \[px\].
+    pub fn crossing(&self, edge: usize, run: f64) -> Option<f64> {
+        let (before, after, share) = self.around(edge, run)?;
+        let (a, b) = (before.seen[edge].cross, after.seen[edge].cross);
+        Some(a + (b - a) * share)
+    }
+
+    /// How far along the bead that is \[mm\].
+    pub fn along_at(&self, edge: usize, run: f64) -> Option<f64> {
+        let (before, after, share) = self.around(edge, run)?;
+        Some(before.along_mm + (after.along_mm - before.along_mm) * share)
+    }
+
+    fn around(&self, edge: usize, run: f64) -> Option<(&Sample, &Sample, f64)> {
+        let after = self.samples.partition_point(|s| s.seen[edge].run < run);
+        let (before, after) = (self.samples.get(after.checked_sub(1)?)?, self.samples.get(after)?);
+        let (a, b) = (before.seen[edge].run, after.seen[edge].run);
+        Some((before, after, if b > a { (run - a) / (b - a) } else { 0.0 }))
+    }
+
+    /// Whether all of a stretch has been laid.
+    pub fn is_whole(&self, from_mm: f64, to_mm: f64) -> bool {
+        self.stretches.iter().any(|s| s.from_mm <= from_mm && to_mm <= s.to_mm)
+    }
+}
+
+type Laid = Option<(f64, f64)>;
+
+/// The samples with the offsets of the nearest bead where there is none.
+fn filled(places: &[(f64, Laid)]) -> Option<impl Iterator<Item = (f64, (f64, f64))>> {
+    let mut last = places.iter().find_map(|(_, laid)| *laid)?;
+    Some(places.iter().map(move |(along_mm, laid)| {
+        last = laid.unwrap_or(last);
+        (*along_mm, last)
+    }))
+}
+
+fn stretches(places: &[(f64, Laid)], bead: &Bead<'_>) -> Vec<Stretch> {
+    let mut found = Vec::new();
+    let mut begun = places.first().and_then(|(_, laid)| laid.map(|_| f64::NEG_INFINITY));
+    for pair in places.windows(2) {
+        let [(before, was), (after, is)] = pair else { continue };
+        match (was, is, begun) {
+            (None, Some(_), _) => begun = Some(border(bead, *after, *before)),
+            (Some(_), None, Some(from_mm)) => {
+                found.push(Stretch { from_mm, to_mm: border(bead, *before, *after) });
+                begun = None;
+            }
+            _ => {}
+        }
+    }
+    found.extend(begun.map(|from_mm| Stretch { from_mm, to_mm: f64::INFINITY }));
+    found
+}
+
+/// Where bead turns to no bead between two places.
+fn border(bead: &Bead<'_>, mut with_mm: f64, mut without_mm: f64) -> f64 {
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (with_mm + without_mm);
+        if bead(middle).is_some() {
+            with_mm = middle;
+        } else {
+            without_mm = middle;
+        }
+    }
+    with_mm
+}

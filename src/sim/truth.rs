@@ -1,0 +1,79 @@
+//! What is true of a rendered frame.
+
+use super::outline::{Outline, Sample};
+use super::view::{Place, View, gauge_middle};
+use crate::geometry::ImagePoint;
+use crate::vision::{Axis, Gauge};
+
+/// What a perfect measurement of a rendered frame would find.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Truth {
+    /// Mean distance of the edges at the surface, normal to the bead's axis:
+    /// each edge is averaged over the part of it that lies within the gauge
+    /// \[mm\].
+    pub width_mm: f64,
+    /// Where the left (of a horizontal bead the upper) edge crosses the middle
+    /// of the gauge, in raw image pixels.
+    pub left: ImagePoint,
+    /// Where the right (or lower) edge crosses it.
+    pub right: ImagePoint,
+    /// Standard deviation of the width about its mean, along the part of the
+    /// bead of which both edges lie within the gauge \[mm\].
+    pub roughness_mm: f64,
+}
+
+/// `None` unless the bead runs through the whole gauge.
+pub(super) fn of(outline: &Outline, view: &View, gauge: &Gauge) -> Option<Truth> {
+    let middle = gauge_middle(&gauge.roi);
+    let (run, count) = match gauge.axis {
+        Axis::Vertical => (middle.y, gauge.roi.height),
+        Axis::Horizontal => (middle.x, gauge.roi.width),
+    };
+    #[expect(clippy::cast_precision_loss, reason = "pixel numbers stay far below 2^53")]
+    let half = count as f64 / 2.0;
+    let stretch = |side: usize| {
+        let a = outline.along_at(side, run - half)?;
+        let b = outline.along_at(side, run + half)?;
+        Some((a.min(b), a.max(b)))
+    };
+    let (left, right) = (stretch(0)?, stretch(1)?);
+    if !outline.is_whole(left.0.min(right.0), left.1.max(right.1)) {
+        return None;
+    }
+    let offset = |side: usize, stretch| mean(outline, stretch, |s| s.offset_mm[side]);
+    let both = (left.0.max(right.0), left.1.min(right.1));
+    let width = |s: &Sample| s.offset_mm[1] - s.offset_mm[0];
+    let centre = mean(outline, both, width);
+    let variance = mean(outline, both, |s| (width(s) - centre).powi(2));
+    let point = |side: usize| {
+        let cross = outline.crossing(side, run)?;
+        Some(view.image_point(Place { run, cross }))
+    };
+    Some(Truth {
+        width_mm: offset(1, right) - offset(0, left),
+        left: point(0)?,
+        right: point(1)?,
+        roughness_mm: variance.max(0.0).sqrt(),
+    })
+}
+
+/// Mean of a quantity, straight between the samples, along a stretch of bead.
+fn mean(outline: &Outline, (from_mm, to_mm): (f64, f64), of: impl Fn(&Sample) -> f64) -> f64 {
+    let mut sum = 0.0;
+    let mut length = 0.0;
+    for pair in outline.samples.windows(2) {
+        let (mut a, mut b) = (&pair[0], &pair[1]);
+        if a.along_mm > b.along_mm {
+            (a, b) = (b, a);
+        }
+        let from = from_mm.max(a.along_mm);
+        let to = to_mm.min(b.along_mm);
+        if to > from {
+            let middle = (0.5 * (from + to) - a.along_mm) / (b.along_mm - a.along_mm);
+            let (at_a, at_b) = (of(a), of(b));
+            sum += (to - from) * (at_a + (at_b - at_a) * middle);
+            length += to - from;
+        }
+    }
+    if length > 0.0 { sum / length } else { 0.0 }
+}

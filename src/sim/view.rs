@@ -1,0 +1,143 @@
+//! Where a bead lies in the picture: from places along and across the bead to
+//! pixels.
+//!
+//! The nozzle is beyond the top of the picture for a vertical bead and beyond
+//! its right side for a horizontal one, so that the left edge of the bead, seen
+//! in the direction of travel, is the left or the upper one in the picture.
+
+use nalgebra::Vector2;
+
+use crate::calib::SurfaceMap;
+use crate::geometry::{ImagePoint, Roi, SurfacePoint};
+use crate::vision::{Axis, Gauge};
+
+/// Places on the surface by their distance along the bead \[mm\], counted from
+/// the middle of the gauge in the direction of travel, and across it, positive
+/// to the right.
+#[derive(Debug, Clone, Copy)]
+pub struct View {
+    map: SurfaceMap,
+    origin: SurfacePoint,
+    along: Vector2<f64>,
+    across: Vector2<f64>,
+    axis: Axis,
+    /// Length along the bead of one pixel in the middle of the gauge \[mm\].
+    pub pixel_mm: f64,
+}
+
+/// The middle of the gauge \[px\].
+pub fn gauge_middle(roi: &Roi) -> ImagePoint {
+    #[expect(clippy::cast_precision_loss, reason = "pixel numbers stay far below 2^53")]
+    let middle = |first: usize, count: usize| first as f64 + (count as f64 - 1.0) / 2.0;
+    ImagePoint::new(middle(roi.x, roi.width), middle(roi.y, roi.height))
+}
+
+impl View {
+    /// The bead runs through the middle of the gauge, shifted sideways by
+    /// `lateral_mm`, along the gauge's axis as it lies on the surface, turned
+    /// by `slant_deg` to the right. `None` where the middle of the gauge does
+    /// not see the surface.
+    pub fn new(map: SurfaceMap, gauge: &Gauge, slant_deg: f64, lateral_mm: f64) -> Option<Self> {
+        let middle = gauge_middle(&gauge.roi);
+        let mm_per_px = map.mm_per_px(middle)?;
+        let (ahead, right) = match gauge.axis {
+            Axis::Vertical => (Vector2::new(0.0, -1.0), Vector2::new(1.0, 0.0)),
+            Axis::Horizontal => (Vector2::new(1.0, 0.0), Vector2::new(0.0, 1.0)),
+        };
+        let (ahead_mm, right_mm) = (mm_per_px * ahead, mm_per_px * right);
+        let straight = ahead_mm.try_normalize(0.0)?;
+        let normal = Vector2::new(-straight.y, straight.x);
+        let sideways = if normal.dot(&right_mm) < 0.0 { -normal } else { normal };
+        let (sin, cos) = libm::sincos(slant_deg.to_radians());
+        let along = straight * cos + sideways * sin;
+        let across = sideways * cos - straight * sin;
+        let origin = map.to_mm(middle)? + across * lateral_mm;
+        Some(Self { map, origin, along, across, axis: gauge.axis, pixel_mm: ahead_mm.norm() })
+    }
+
+    /// The pixel of a place; `None` behind the camera.
+    pub fn px(&self, along_mm: f64, across_mm: f64) -> Option<Place> {
+        let px = self.map.to_px(self.origin + self.along * along_mm + self.across * across_mm)?;
+        (px.x.is_finite() && px.y.is_finite()).then(|| self.place(px))
+    }
+
+    /// Distance of a pixel's place along the bead \[mm\].
+    pub fn along_mm(&self, px: ImagePoint) -> Option<f64> {
+        Some((self.map.to_mm(px)? - self.origin).dot(&self.along))
+    }
+
+    fn place(&self, px: ImagePoint) -> Place {
+        match self.axis {
+            Axis::Vertical => Place { run: px.y, cross: px.x },
+            Axis::Horizontal => Place { run: px.x, cross: px.y },
+        }
+    }
+
+    /// The pixel of image coordinates along and across the gauge's axis.
+    pub fn image_point(&self, place: Place) -> ImagePoint {
+        match self.axis {
+            Axis::Vertical => ImagePoint::new(place.cross, place.run),
+            Axis::Horizontal => ImagePoint::new(place.run, place.cross),
+        }
+    }
+
+    /// 1 where `run` grows in the direction of travel, else −1.
+    pub fn run_sign(&self) -> f64 {
+        match self.axis {
+            Axis::Vertical => -1.0,
+            Axis::Horizontal => 1.0,
+        }
+    }
+}
+
+/// A point of the image in the gauge's own directions \[px\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Along the gauge's axis: the row of a vertical bead.
+    pub run: f64,
+    /// Across it: the column of a vertical bead.
+    pub cross: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::Mm;
+    use crate::vision::{Method, Polarity};
+
+    fn gauge(axis: Axis) -> Gauge {
+        Gauge {
+            roi: Roi { x: 10, y: 20, width: 101, height: 51 },
+            axis,
+            polarity: Polarity::Bright,
+            width_range: (Mm::ZERO, Mm::constant(50.0)),
+            method: Method::Caliper,
+            calipers: 64,
+            min_contrast_grey: 6.0,
+        }
+    }
+
+    #[test]
+    fn travel_is_up_or_to_the_right_with_the_left_edge_on_its_left() {
+        let map = SurfaceMap::from_scale(0.5);
+        let up = View::new(map, &gauge(Axis::Vertical), 0.0, 0.0).unwrap();
+        let place = up.px(2.0, -1.0).unwrap();
+        assert_eq!(up.image_point(place), ImagePoint::new(60.0 - 2.0, 45.0 - 4.0));
+        let right = View::new(map, &gauge(Axis::Horizontal), 0.0, 0.0).unwrap();
+        let place = right.px(2.0, -1.0).unwrap();
+        assert_eq!(right.image_point(place), ImagePoint::new(60.0 + 4.0, 45.0 - 2.0));
+    }
+
+    #[test]
+    fn a_slant_leans_to_the_right_and_a_shift_is_normal_to_the_bead() {
+        let map = SurfaceMap::from_scale(1.0);
+        let view = View::new(map, &gauge(Axis::Vertical), 10.0, 3.0).unwrap();
+        let (sin, cos) = 10_f64.to_radians().sin_cos();
+        let place = view.px(0.0, 0.0).unwrap();
+        assert!((place.cross - (60.0 + 3.0 * cos)).abs() < 1e-12);
+        assert!((place.run - (45.0 + 3.0 * sin)).abs() < 1e-12);
+        let ahead = view.px(100.0, 0.0).unwrap();
+        assert!((ahead.cross - place.cross - 100.0 * sin).abs() < 1e-12);
+        assert!((ahead.run - place.run + 100.0 * cos).abs() < 1e-12);
+    }
+}
