@@ -1,6 +1,7 @@
 //! What a person types: one file a command.
 
 pub mod calibrate;
+pub mod render;
 pub mod robot_sim;
 
 /// Arguments that cannot be followed; ends with exit status 2.

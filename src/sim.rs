@@ -3,11 +3,13 @@
 pub mod bead;
 pub mod disturbance;
 pub mod edge;
+pub mod follow;
 pub mod hash;
 pub mod laid;
 pub mod outline;
 pub mod picture;
 pub mod render;
+pub mod scenario;
 pub mod shade;
 pub mod truth;
 pub mod view;

@@ -28,6 +28,9 @@ pub struct Simulation {
     pub level: Level,
     /// Length of the bead.
     pub path: Mm,
+    /// Path length from one picture to the next where no robot sets it, if the
+    /// file says so.
+    pub frame_spacing: Option<Mm>,
     /// Step of the simulated world.
     pub step: Span,
     /// Bandwidth of the robot's speed loop \[Hz\].
@@ -53,6 +56,7 @@ pub fn read(root: &Table<'_>) -> Option<Simulation> {
     let roughness = read_roughness(&bead);
     let flow = read_flow(&bead);
     let picture = read_picture(&render);
+    let spacing = render.optional_number("frame_spacing_mm", 1e-3..=1e5);
     let seed = world.integer_or("seed", 0..=u64::MAX >> 1, 1);
     let level = world.choice("level", &[("frames", Level::Frames), ("widths", Level::Widths)]);
     let path = world.number_or("path_mm", 1.0..=1e7, 2000.0);
@@ -63,6 +67,7 @@ pub fn read(root: &Table<'_>) -> Option<Simulation> {
         seed: seed?,
         level: level?,
         path: Mm::new(path?).ok()?,
+        frame_spacing: spacing.and_then(|spacing| Mm::new(spacing).ok()),
         step: Span::from_secs(step_ms? / 1e3),
         robot_bandwidth_hz: bandwidth?,
         width_noise: Mm::new(noise?).ok()?,

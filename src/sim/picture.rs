@@ -15,9 +15,11 @@ pub struct Picture {
     pub noise_grey: f64,
     /// Light at the brighter end of the picture over light at the other.
     pub light_ratio: f64,
-    /// Angle of the bead to the gauge's axis \[degrees\].
+    /// Angle of the bead to the gauge's axis on the surface \[degrees\]; positive
+    /// where its column grows with the row, or its row with the column.
     pub slant_deg: f64,
-    /// Sideways shift of the bead's middle from the gauge's middle \[mm\].
+    /// Shift of the bead's middle from the gauge's middle, to the right in the
+    /// direction of travel \[mm\].
     pub lateral_mm: f64,
     /// Height at which the bead's top edges really are, where the cell
     /// believes another.

@@ -34,21 +34,22 @@ pub fn gauge_middle(roi: &Roi) -> ImagePoint {
 
 impl View {
     /// The bead runs through the middle of the gauge, shifted sideways by
-    /// `lateral_mm`, along the gauge's axis as it lies on the surface, turned
-    /// by `slant_deg` to the right. `None` where the middle of the gauge does
-    /// not see the surface.
+    /// `lateral_mm`, along the gauge's axis as it lies on the surface. A
+    /// positive `slant_deg` makes its place across the gauge grow with its
+    /// place along it, as in a measurement's slant. `None` where the middle of
+    /// the gauge does not see the surface.
     pub fn new(map: SurfaceMap, gauge: &Gauge, slant_deg: f64, lateral_mm: f64) -> Option<Self> {
         let middle = gauge_middle(&gauge.roi);
         let mm_per_px = map.mm_per_px(middle)?;
-        let (ahead, right) = match gauge.axis {
-            Axis::Vertical => (Vector2::new(0.0, -1.0), Vector2::new(1.0, 0.0)),
-            Axis::Horizontal => (Vector2::new(1.0, 0.0), Vector2::new(0.0, 1.0)),
+        let (ahead, right, turn) = match gauge.axis {
+            Axis::Vertical => (Vector2::new(0.0, -1.0), Vector2::new(1.0, 0.0), -slant_deg),
+            Axis::Horizontal => (Vector2::new(1.0, 0.0), Vector2::new(0.0, 1.0), slant_deg),
         };
         let (ahead_mm, right_mm) = (mm_per_px * ahead, mm_per_px * right);
         let straight = ahead_mm.try_normalize(0.0)?;
         let normal = Vector2::new(-straight.y, straight.x);
         let sideways = if normal.dot(&right_mm) < 0.0 { -normal } else { normal };
-        let (sin, cos) = libm::sincos(slant_deg.to_radians());
+        let (sin, cos) = libm::sincos(turn.to_radians());
         let along = straight * cos + sideways * sin;
         let across = sideways * cos - straight * sin;
         let origin = map.to_mm(middle)? + across * lateral_mm;
@@ -129,9 +130,9 @@ mod tests {
     }
 
     #[test]
-    fn a_slant_leans_to_the_right_and_a_shift_is_normal_to_the_bead() {
+    fn a_slant_turns_the_bead_and_a_shift_is_normal_to_it() {
         let map = SurfaceMap::from_scale(1.0);
-        let view = View::new(map, &gauge(Axis::Vertical), 10.0, 3.0).unwrap();
+        let view = View::new(map, &gauge(Axis::Vertical), -10.0, 3.0).unwrap();
         let (sin, cos) = 10_f64.to_radians().sin_cos();
         let place = view.px(0.0, 0.0).unwrap();
         assert!((place.cross - (60.0 + 3.0 * cos)).abs() < 1e-12);

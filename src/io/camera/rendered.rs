@@ -1,0 +1,149 @@
+//! The rendered camera: pictures of a simulated bead that follows the path and
+//! speed that the robot reports.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
+
+use super::fault;
+use crate::config::rendered::Simulation;
+use crate::config::{Camera, Mount};
+use crate::control::RobotState;
+use crate::io::clock::RunClock;
+use crate::ports::{FrameSource, Grab, SourceError};
+use crate::sim::follow::{Follower, Recipe};
+use crate::sim::render::Renderer;
+use crate::sim::truth::Truth;
+use crate::time::{Span, Stamp};
+
+/// Reports that wait for the camera: some 20 s of a robot that reports every
+/// 20 ms.
+const WAITING_REPORTS: usize = 1024;
+
+/// Tells the camera what the robot reports. Copies feed the same camera.
+#[derive(Debug, Clone)]
+pub struct RobotView(Sender<(Stamp, RobotState)>);
+
+impl RobotView {
+    /// Passes on a report that arrived at a moment; never waits. What a camera
+    /// that takes no frames leaves lying is lost, and the next report stands
+    /// for it.
+    pub fn observe(&self, at: Stamp, state: &RobotState) {
+        let _ = self.0.try_send((at, *state));
+    }
+}
+
+/// Truth of the frames that a camera gave, by frame. Copies show the same.
+#[derive(Debug, Clone, Default)]
+pub struct TruthLog(Arc<Mutex<Vec<TruthRow>>>);
+
+/// Number of a frame, and its truth if the bead ran through the whole gauge.
+pub type TruthRow = (u64, Option<Truth>);
+
+impl TruthLog {
+    /// Everything so far, in the order of the frames.
+    pub fn rows(&self) -> Vec<TruthRow> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn push(&self, seq: u64, truth: Option<Truth>) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push((seq, truth));
+    }
+}
+
+/// Takes pictures at a fixed rate of what lies under the camera.
+pub struct RenderedCamera {
+    renderer: Renderer,
+    follower: Follower,
+    reports: Receiver<(Stamp, RobotState)>,
+    stop: Receiver<()>,
+    clock: RunClock,
+    period: Span,
+    offset_mm: f64,
+    rides: bool,
+    truths: TruthLog,
+    seq: u64,
+    due: Option<Stamp>,
+    first: Option<Stamp>,
+}
+
+impl RenderedCamera {
+    /// A camera as the cell describes it. It ends, within a frame's period,
+    /// when `stop` is sent to or its sender is dropped.
+    pub fn new(
+        renderer: Renderer,
+        simulation: &Simulation,
+        camera: &Camera,
+        clock: RunClock,
+        stop: Receiver<()>,
+    ) -> (Self, RobotView, TruthLog) {
+        let recipe = Recipe {
+            model: simulation.bead,
+            roughness: simulation.roughness,
+            flow: simulation.flow,
+            seed: simulation.seed,
+        };
+        let (told, reports) = bounded(WAITING_REPORTS);
+        let truths = TruthLog::default();
+        let source = Self {
+            renderer,
+            follower: Follower::new(recipe),
+            reports,
+            stop,
+            clock,
+            period: Span::from_secs(1.0 / camera.rate_hz),
+            offset_mm: camera.offset.get(),
+            rides: camera.mount == Mount::Flange,
+            truths: truths.clone(),
+            seq: 0,
+            due: None,
+            first: None,
+        };
+        (source, RobotView(told), truths)
+    }
+
+    /// Waits until the next frame is due; false when the camera was stopped.
+    /// Frames that are overdue are left out, not crowded.
+    fn wait(&mut self) -> bool {
+        let now = self.clock.now();
+        let due = self.due.map_or(now, |due| (due + self.period).max(now));
+        self.due = Some(due);
+        loop {
+            let left = (due - self.clock.now()).max(Span::ZERO);
+            let wait = Duration::from_nanos(u64::try_from(left.ns()).unwrap_or(0));
+            match self.stop.recv_timeout(wait) {
+                Err(RecvTimeoutError::Timeout) if self.clock.now() >= due => return true,
+                Err(RecvTimeoutError::Timeout) => {}
+                Ok(()) | Err(RecvTimeoutError::Disconnected) => return false,
+            }
+        }
+    }
+}
+
+impl FrameSource for RenderedCamera {
+    fn next_frame(&mut self) -> Result<Option<Grab>, SourceError> {
+        if !self.wait() {
+            return Ok(None);
+        }
+        let captured_at = self.clock.now();
+        for (at, state) in self.reports.try_iter() {
+            self.follower.observe(at, &state);
+        }
+        let under = self.follower.path_at(captured_at).map(|nozzle| nozzle - self.offset_mm);
+        let bead = self.follower.bead();
+        let robot_z = self.follower.z().filter(|_| self.rides);
+        let rendered = self
+            .renderer
+            .render(self.seq, captured_at, robot_z, &|along| bead.edges_at(under? + along))
+            .map_err(|error| fault("rendered", error.to_string()))?;
+        self.truths.push(self.seq, rendered.truth);
+        self.seq += 1;
+        let first = *self.first.get_or_insert(captured_at);
+        let time_s = Some((captured_at - first).secs());
+        Ok(Some(Grab::Frame { frame: rendered.frame, time_s }))
+    }
+}
+
+#[cfg(test)]
+mod tests;

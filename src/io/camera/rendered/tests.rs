@@ -1,0 +1,117 @@
+use super::*;
+use crate::calib::Calibration;
+use crate::config::Source;
+use crate::control::RobotMode;
+use crate::frame::Frame;
+use crate::geometry::Roi;
+use crate::sim::bead::{BeadModel, Roughness};
+use crate::sim::disturbance::Flow;
+use crate::sim::picture::Picture;
+use crate::units::{Mm, MmPerS};
+use crate::vision::{Axis, Gauge, Method, Polarity};
+
+const SMOOTH_STEADY: Simulation = Simulation {
+    seed: 1,
+    level: crate::config::rendered::Level::Frames,
+    path: Mm::constant(2000.0),
+    frame_spacing: None,
+    step: Span::from_millis(20),
+    robot_bandwidth_hz: 10.0,
+    width_noise: Mm::ZERO,
+    bead: BeadModel {
+        width_mm: 10.0,
+        at_speed_mm_per_s: 100.0,
+        exponent: 0.25,
+        slow_below_mm_per_s: 0.0,
+        slow_exponent: 0.25,
+    },
+    roughness: Roughness { size_mm: 0.0, length_mm: 5.0 },
+    flow: Flow { step_at_mm: 0.0, step_ratio: 1.0, wave_share: 0.0, wavelength_mm: 1000.0 },
+    picture: Picture {
+        size_px: [160, 120],
+        bead_grey: 150.0,
+        ground_grey: 70.0,
+        blur_px: 1.0,
+        noise_grey: 0.0,
+        light_ratio: 1.0,
+        slant_deg: 0.0,
+        lateral_mm: 0.0,
+        true_surface_height_mm: None,
+    },
+};
+
+fn camera() -> (RenderedCamera, RobotView, TruthLog, Sender<()>) {
+    let gauge = Gauge {
+        roi: Roi { x: 10, y: 10, width: 140, height: 100 },
+        axis: Axis::Vertical,
+        polarity: Polarity::Bright,
+        width_range: (Mm::constant(1.0), Mm::constant(15.0)),
+        method: Method::Caliper,
+        calipers: 32,
+        min_contrast_grey: 6.0,
+    };
+    let described = Camera {
+        source: Source::Rendered,
+        source_name: "rendered".to_string(),
+        rate_hz: 500.0,
+        mount: Mount::Flange,
+        offset: Mm::constant(90.0),
+        deadline: Span::from_millis(2000),
+    };
+    let scale = Calibration::Scale { mm_per_px: 0.1 };
+    let picture = SMOOTH_STEADY.picture;
+    let renderer = Renderer::new(scale, Mm::ZERO, gauge, picture, 1).unwrap();
+    let (stop, stopped) = bounded(1);
+    let (camera, view, truths) =
+        RenderedCamera::new(renderer, &SMOOTH_STEADY, &described, RunClock::start(), stopped);
+    (camera, view, truths, stop)
+}
+
+fn printing(path_mm: f64) -> RobotState {
+    RobotState {
+        t_ms: 0,
+        seq: 0,
+        mode: RobotMode::Print,
+        speed_mm_per_s: MmPerS::constant(100.0),
+        path_mm: Mm::constant(path_mm),
+        z_mm: Mm::ZERO,
+    }
+}
+
+fn next(camera: &mut RenderedCamera) -> Frame {
+    match camera.next_frame().unwrap().unwrap() {
+        Grab::Frame { frame, .. } => frame,
+        Grab::Unreadable { reason, .. } => panic!("{reason}"),
+    }
+}
+
+fn middle(frame: &Frame) -> u8 {
+    frame.to_grey8()[60 * 160 + 80]
+}
+
+#[test]
+fn the_camera_shows_what_the_robot_laid_its_offset_before() {
+    let (mut camera, view, truths, _stop) = camera();
+    assert_eq!(middle(&next(&mut camera)), 70, "ground, before anything is heard");
+    view.observe(Stamp::START, &printing(20.0));
+    assert_eq!(middle(&next(&mut camera)), 70, "ground, before the bead is under the camera");
+    view.observe(Stamp::START, &printing(200.0));
+    let frame = next(&mut camera);
+    assert_eq!(middle(&frame), 150);
+    assert_eq!(frame.seq, 2);
+    let rows = truths.rows();
+    assert_eq!(rows.len(), 3);
+    assert_eq!(rows[0], (0, None));
+    assert!((rows[2].1.unwrap().width_mm - 10.0).abs() < 1e-9);
+}
+
+#[test]
+fn stamps_grow_and_a_stop_ends_the_frames() {
+    let (mut camera, _view, _truths, stop) = camera();
+    let (first, second) = (next(&mut camera), next(&mut camera));
+    assert!(second.captured_at > first.captured_at);
+    stop.send(()).unwrap();
+    assert_eq!(camera.next_frame(), Ok(None));
+    drop(stop);
+    assert_eq!(camera.next_frame(), Ok(None));
+}

@@ -1,0 +1,203 @@
+//! Lays a simulated bead behind a robot that reports where it is.
+
+use super::bead::{BeadModel, Roughness};
+use super::disturbance::Flow;
+use super::hash;
+use super::laid::LaidBead;
+use crate::control::{RobotMode, RobotState};
+use crate::time::{Span, Stamp};
+use crate::units::Mm;
+
+/// Longest stretch between two reports that is still taken for one bead
+/// \[mm\]: a robot that was connected in the middle of its bead, or was not
+/// heard for a while.
+const LONGEST_STRETCH_MM: f64 = 5000.0;
+/// Longest time over which a position is carried on from the last report.
+const LONGEST_OUTLOOK: Span = Span::from_millis(500);
+/// A path that falls back by less is the same bead \[mm\].
+const FALL_BACK_MM: f64 = 0.01;
+
+/// What every bead is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Recipe {
+    /// How wide a bead comes out at a speed.
+    pub model: BeadModel,
+    /// How rough its edges are.
+    pub roughness: Roughness,
+    /// What the pump does to its flow.
+    pub flow: Flow,
+    /// Seed of everything random; every bead has its own roughness.
+    pub seed: u64,
+}
+
+/// Follows a robot and lays what it prints. A bead begins when the robot goes
+/// to `PRINT`, and when its path falls back or jumps; it grows in `PRINT` and
+/// `HOLD`. Between two reports speed changes evenly along the path.
+#[derive(Debug, Clone)]
+pub struct Follower {
+    recipe: Recipe,
+    beads: u64,
+    laid: LaidBead,
+    before: Option<(Stamp, RobotState)>,
+    last: Option<(Stamp, RobotState)>,
+}
+
+impl Follower {
+    /// Of a robot that has not been heard yet.
+    pub fn new(recipe: Recipe) -> Self {
+        Self { recipe, beads: 0, laid: bead_of(&recipe, 0), before: None, last: None }
+    }
+
+    /// Takes a report that arrived at a moment. Reports come in order.
+    pub fn observe(&mut self, at: Stamp, state: &RobotState) {
+        let path = state.path_mm.get();
+        if lays(state.mode) {
+            let previous = self.last.map(|(_, last)| last);
+            let goes_on = previous.is_some_and(|last| lays(last.mode) && follows(&last, state));
+            if goes_on && let Some(last) = previous {
+                let stretch = (last.path_mm.get(), path);
+                let speeds = (last.speed_mm_per_s.get(), state.speed_mm_per_s.get());
+                self.laid.lay_ramp(stretch, speeds);
+            } else {
+                self.begin(previous, state);
+            }
+        }
+        self.before = self.last.replace((at, *state));
+    }
+
+    /// A new bead, from where the robot stood before it printed.
+    fn begin(&mut self, previous: Option<RobotState>, state: &RobotState) {
+        self.laid = bead_of(&self.recipe, self.beads);
+        self.beads += 1;
+        let stood = previous.filter(|last| !lays(last.mode) && follows(last, state));
+        let path = state.path_mm.get();
+        let from = stood.map_or(0.0, |last| last.path_mm.get());
+        let from = from.clamp(path - LONGEST_STRETCH_MM, path);
+        self.laid.lay(from, path, state.speed_mm_per_s.get());
+    }
+
+    /// Distance of the nozzle along its path at a moment \[mm\]: between the
+    /// last two reports, and carried on at the last speed for up to half a
+    /// second. `None` before the first report.
+    pub fn path_at(&self, at: Stamp) -> Option<f64> {
+        let (reported, state) = self.last?;
+        let path = state.path_mm.get();
+        let ahead = at - reported;
+        if ahead >= Span::ZERO {
+            let moves = if lays(state.mode) { state.speed_mm_per_s.get() } else { 0.0 };
+            return Some(path + moves * ahead.min(LONGEST_OUTLOOK).secs());
+        }
+        let (earlier, old) = self.before.filter(|(_, old)| follows(old, &state))?;
+        let share = ((at - earlier).secs() / (reported - earlier).secs()).max(0.0);
+        Some(old.path_mm.get() + (path - old.path_mm.get()) * share)
+    }
+
+    /// The last height of the nozzle.
+    pub fn z(&self) -> Option<Mm> {
+        self.last.map(|(_, state)| state.z_mm)
+    }
+
+    /// The bead that was begun last.
+    pub fn bead(&self) -> &LaidBead {
+        &self.laid
+    }
+
+    /// How many beads have been begun.
+    pub fn beads(&self) -> u64 {
+        self.beads
+    }
+}
+
+fn lays(mode: RobotMode) -> bool {
+    matches!(mode, RobotMode::Print | RobotMode::Hold)
+}
+
+/// Whether a report continues the path of another.
+fn follows(last: &RobotState, next: &RobotState) -> bool {
+    let stretch = (next.path_mm - last.path_mm).get();
+    (-FALL_BACK_MM..=LONGEST_STRETCH_MM).contains(&stretch)
+}
+
+fn bead_of(recipe: &Recipe, number: u64) -> LaidBead {
+    let seed = hash::mix(&[recipe.seed, number]);
+    LaidBead::new(recipe.model, recipe.roughness, recipe.flow, seed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::MmPerS;
+
+    fn follower() -> Follower {
+        Follower::new(Recipe {
+            model: BeadModel::fitted_2022(),
+            roughness: Roughness { size_mm: 0.0, length_mm: 5.0 },
+            flow: Flow { step_at_mm: 0.0, step_ratio: 1.0, wave_share: 0.0, wavelength_mm: 1e3 },
+            seed: 1,
+        })
+    }
+
+    fn state(mode: RobotMode, path_mm: f64, speed: f64) -> RobotState {
+        RobotState {
+            t_ms: 0,
+            seq: 0,
+            mode,
+            speed_mm_per_s: MmPerS::constant(speed),
+            path_mm: Mm::constant(path_mm),
+            z_mm: Mm::constant(120.0),
+        }
+    }
+
+    fn at(ms: i64) -> Stamp {
+        Stamp::START + Span::from_millis(ms)
+    }
+
+    #[test]
+    fn the_bead_is_as_wide_as_the_reported_speed_makes_it() {
+        let mut follower = follower();
+        follower.observe(at(0), &state(RobotMode::Idle, 0.0, 0.0));
+        follower.observe(at(100), &state(RobotMode::Print, 5.0, 112.5));
+        follower.observe(at(200), &state(RobotMode::Print, 16.0, 112.5));
+        follower.observe(at(300), &state(RobotMode::Hold, 24.0, 70.0));
+        let model = BeadModel::fitted_2022();
+        for (path, speed) in [(0.0, 112.5), (4.0, 112.5), (15.0, 112.5)] {
+            let width = follower.bead().width_at(path).unwrap();
+            assert!((width - model.width_at(speed)).abs() < 1e-9, "at {path}: {width}");
+        }
+        let width = follower.bead().width_at(20.0).unwrap();
+        assert!((width - model.width_at(91.25)).abs() < 0.5);
+        assert_eq!(follower.bead().end_mm(), Some(24.0));
+        assert_eq!(follower.z(), Some(Mm::constant(120.0)));
+    }
+
+    #[test]
+    fn the_nozzle_is_where_its_speed_has_brought_it() {
+        let mut follower = follower();
+        assert_eq!(follower.path_at(at(0)), None);
+        follower.observe(at(100), &state(RobotMode::Print, 10.0, 100.0));
+        follower.observe(at(200), &state(RobotMode::Print, 18.0, 100.0));
+        assert!((follower.path_at(at(250)).unwrap() - 23.0).abs() < 1e-9);
+        assert!((follower.path_at(at(150)).unwrap() - 14.0).abs() < 1e-9);
+        assert!((follower.path_at(at(9000)).unwrap() - 68.0).abs() < 1e-9);
+        follower.observe(at(300), &state(RobotMode::Stop, 20.0, 50.0));
+        assert!((follower.path_at(at(400)).unwrap() - 20.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_new_bead_begins_with_print_and_with_a_path_that_falls_back() {
+        let mut follower = follower();
+        follower.observe(at(0), &state(RobotMode::Print, 300.0, 100.0));
+        assert_eq!(follower.beads(), 1);
+        assert!(follower.bead().width_at(10.0).is_some(), "laid before it was heard");
+        follower.observe(at(100), &state(RobotMode::Print, 310.0, 100.0));
+        follower.observe(at(200), &state(RobotMode::Idle, 310.0, 0.0));
+        assert_eq!(follower.beads(), 1);
+        assert!(follower.bead().width_at(305.0).is_some(), "the bead stays on the bed");
+        follower.observe(at(300), &state(RobotMode::Print, 311.0, 100.0));
+        assert_eq!(follower.beads(), 2);
+        assert_eq!(follower.bead().width_at(305.0), None);
+        follower.observe(at(400), &state(RobotMode::Print, 2.0, 100.0));
+        assert_eq!(follower.beads(), 3);
+        assert_eq!(follower.bead().end_mm(), Some(2.0));
+    }
+}
