@@ -1,8 +1,62 @@
 //! What a person types: one file a command.
+//!
+//! Results go to standard output or files, everything else to standard error.
+//! Exit status: 0 done; 1 failed, or a verdict that is "no"; 2 wrong arguments
+//! or configuration; 3 finished, but too many frames were refused or records
+//! were lost.
 
 pub mod calibrate;
+pub mod cell;
+pub mod check;
+pub mod process;
 pub mod render;
 pub mod robot_sim;
+
+use std::process::ExitCode;
+
+use clap::{ArgAction, Parser, Subcommand};
+use tracing_subscriber::EnvFilter;
+
+use crate::config::Problems;
+use crate::io::calibration_file::CalibrationFileError;
+
+/// Status of a command that finished, but with too many frames refused or
+/// records lost.
+pub const WITH_LOSS: u8 = 3;
+
+/// Keeps an extruded bead at the width that was asked for.
+///
+/// A camera looks at the fresh bead, its width is measured, and the robot's
+/// speed is corrected over TCP. Try `truebead demo` first: it runs the whole
+/// loop with nothing attached.
+#[derive(Debug, Parser)]
+#[command(name = "truebead", version, propagate_version = true, max_term_width = 100)]
+pub struct Cli {
+    /// Say more: -v what is being done, -vv every detail
+    #[arg(short, long, action = ArgAction::Count, global = true)]
+    verbose: u8,
+    /// Say nothing but errors
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Process(process::ProcessArgs),
+    Calibrate(calibrate::CalibrateArgs),
+    Render(render::RenderArgs),
+    RobotSim(robot_sim::RobotSimArgs),
+    Check(check::CheckArgs),
+}
+
+/// How much a command says on standard error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Voice {
+    /// Nothing but errors.
+    pub quiet: bool,
+}
 
 /// Arguments that cannot be followed; ends with exit status 2.
 #[derive(Debug, thiserror::Error)]
@@ -14,4 +68,47 @@ impl WrongArguments {
     pub fn new(what: impl ToString) -> Self {
         Self(what.to_string())
     }
+}
+
+/// Runs the program.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    listen(&cli);
+    let voice = Voice { quiet: cli.quiet };
+    let done = match &cli.command {
+        Command::Process(args) => process::run(args, voice),
+        Command::Calibrate(args) => calibrate::run(args).map(|()| ExitCode::SUCCESS),
+        Command::Render(args) => render::run(args).map(|()| ExitCode::SUCCESS),
+        Command::RobotSim(args) => robot_sim::run(args).map(|()| ExitCode::SUCCESS),
+        Command::Check(args) => check::run(args),
+    };
+    done.unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        status_of(&error)
+    })
+}
+
+/// Configuration and arguments are told from failures at work.
+fn status_of(error: &anyhow::Error) -> ExitCode {
+    let wrong = error.chain().any(|cause| {
+        cause.is::<WrongArguments>() || cause.is::<Problems>() || cause.is::<CalibrationFileError>()
+    });
+    ExitCode::from(if wrong { 2 } else { 1 })
+}
+
+/// Sends the library's words to standard error.
+fn listen(cli: &Cli) {
+    let level = match (cli.quiet, cli.verbose) {
+        (true, _) => "error",
+        (_, 0) => "warn",
+        (_, 1) => "truebead=info,warn",
+        _ => "truebead=debug,info",
+    };
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_target(false)
+        .without_time()
+        .init();
 }

@@ -9,4 +9,5 @@ pub mod record;
 pub mod recording;
 pub mod robot;
 pub mod robot_sim;
+pub mod stop;
 pub mod whole_file;

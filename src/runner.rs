@@ -1,7 +1,7 @@
 //! Drives a controller and what it is plugged into: every event goes through
 //! here, whether the cell is live or simulated.
 
-use crate::control::{Command, Event, Step};
+use crate::control::{Event, Step};
 use crate::controller::Controller;
 use crate::ports::{RecordError, Recorder, RobotPort};
 use crate::time::Stamp;
@@ -82,7 +82,7 @@ impl Recorder for NoRecorder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::{Hold, State};
+    use crate::control::{Command, Hold, State};
 
     struct NoRobot;
 

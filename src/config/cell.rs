@@ -39,6 +39,8 @@ pub struct Cell {
     pub gauge: Gauge,
     /// Channel of a colour image that is measured.
     pub channel: Channel,
+    /// Upper end of the camera's scale where it is not that of the pixels.
+    pub white: Option<u16>,
     /// Width that is asked for, if the file says so.
     pub target: Option<Mm>,
     /// How often frames are wanted \[Hz\], if the file says so.
@@ -169,6 +171,7 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let gauge_table = root.required_table("gauge");
     let gauge = gauge_table.as_ref().and_then(read_gauge);
     let channel = gauge_table.as_ref().and_then(read_channel);
+    let bit_depth = gauge_table.as_ref().and_then(|t| t.optional_integer("bit_depth", 8..=16));
     let recording = read_recording(root.table("recording").as_ref());
     let control_table = root.run_table("control");
     let target = control_table.as_ref().and_then(control::read_target);
@@ -191,6 +194,7 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
         surface_height: Mm::new(surface_height?).ok()?,
         gauge: gauge?,
         channel: channel?,
+        white: bit_depth.and_then(|bits| u16::try_from((1u32 << bits) - 1).ok()),
         target,
         frame_rate_hz,
         mount,

@@ -3,6 +3,7 @@
 pub mod folder;
 pub mod live;
 pub mod mcap;
+pub mod open;
 pub mod rendered;
 pub mod snapshot;
 pub mod video;

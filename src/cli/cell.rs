@@ -1,0 +1,68 @@
+//! Loading a cell with all that it refers to.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+
+use super::WrongArguments;
+use crate::calib::{Calibration, SurfaceMap};
+use crate::config::Cell;
+use crate::config::cell::{CalibrationSource, Mount, Purpose};
+use crate::io::calibration_file;
+use crate::units::Mm;
+
+/// A cell, its calibration, and their texts for the recording.
+#[derive(Debug, Clone)]
+pub struct LoadedCell {
+    /// The file as the command named it.
+    pub path: PathBuf,
+    /// Its text.
+    pub text: String,
+    /// What stands in it.
+    pub cell: Cell,
+    /// What a pixel means in it.
+    pub calibration: Calibration,
+    /// The calibration file's text, where there is one.
+    pub calibration_text: Option<String>,
+}
+
+impl LoadedCell {
+    /// Reads a cell file and its calibration. Everything that is wrong with a
+    /// file is reported at once.
+    pub fn read(path: &Path, purpose: Purpose) -> anyhow::Result<Self> {
+        let text = fs::read_to_string(path).map_err(|error| {
+            WrongArguments::new(format!("cell file {}: {error}", path.display()))
+        })?;
+        let cell = Cell::parse(path, &text, purpose)?;
+        let (calibration, calibration_text) = match &cell.calibration {
+            CalibrationSource::Scale(mm_per_px) => {
+                (Calibration::Scale { mm_per_px: *mm_per_px }, None)
+            }
+            CalibrationSource::File(file) => {
+                let calibration = calibration_file::read(file)?;
+                let text = fs::read_to_string(file)
+                    .with_context(|| format!("calibration file {}", file.display()))?;
+                (calibration, Some(text))
+            }
+        };
+        Ok(Self { path: path.to_owned(), text, cell, calibration, calibration_text })
+    }
+
+    /// The map of the measured surface, for a camera that rides as the cell
+    /// says, at the robot's present z.
+    pub fn surface(&self, robot_z: Option<Mm>) -> SurfaceMap {
+        let z = if self.cell.mount == Some(Mount::Fixed) { None } else { robot_z };
+        self.calibration.surface(self.cell.surface_height, z)
+    }
+
+    /// Calibration and height in words, for the head of a report.
+    pub fn calibration_words(&self) -> String {
+        match &self.cell.calibration {
+            CalibrationSource::Scale(mm_per_px) => format!("{mm_per_px} mm/px at the surface"),
+            CalibrationSource::File(file) => {
+                format!("{}, surface {} above the bed", file.display(), self.cell.surface_height)
+            }
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! `truebead process`: measures recorded frames offline.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::Context;
+use clap::Args;
+use crossbeam_channel::{Sender, bounded};
+
+use super::cell::LoadedCell;
+use super::{Voice, WITH_LOSS, WrongArguments};
+use crate::config::cell::Purpose;
+use crate::io::camera::mcap::RobotZ;
+use crate::io::camera::open::{self, OfflineOptions};
+use crate::io::stop::StopSignal;
+use crate::offline::{FrameRow, LogOptions, Note, Progress, RunLog, Summary};
+use crate::ports::{FrameSource, Grab, SourceError};
+use crate::vision::{Measurer, Reject};
+
+/// Frames that may wait between reading and measuring.
+const WAITING: usize = 8;
+/// Unreadable frames that are named one by one.
+const NAMED: u64 = 10;
+
+/// Measures the bead in recorded frames.
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Examples:
+  truebead process frames/ --cell cell.toml --out measured/
+  truebead process clip.mp4 --cell cell.toml --out measured/
+  truebead process recording.mcap --cell cell.toml --out measured/
+
+Leaves widths.csv, summary.json and report.html in the output folder. The cell
+needs [calibration] and [gauge] only.")]
+pub struct ProcessArgs {
+    /// Folder of images, video file or MCAP
+    input: PathBuf,
+    /// Cell file
+    #[arg(long, value_name = "CELL.toml")]
+    cell: PathBuf,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Frames a second, where the input does not know its times
+    #[arg(long, value_name = "F")]
+    fps: Option<f64>,
+    /// Topic of the frames in an MCAP [default: the first with images]
+    #[arg(long, value_name = "TOPIC")]
+    topic: Option<String>,
+}
+
+/// Runs the command; the summary goes to standard output.
+pub fn run(args: &ProcessArgs, voice: Voice) -> anyhow::Result<ExitCode> {
+    let loaded = LoadedCell::read(&args.cell, Purpose::Measure)?;
+    let options = OfflineOptions {
+        fps: args.fps,
+        topic: args.topic.as_deref(),
+        channel: loaded.cell.channel,
+    };
+    let recorded = open::recorded(&args.input, options).map_err(wrong_input)?;
+    let stop = StopSignal::install().context("cannot wait for signals")?;
+    let log = RunLog::create(LogOptions {
+        folder: args.out.clone(),
+        title: format!("Widths of {}", args.input.display()),
+        about: vec![
+            ("input".into(), args.input.display().to_string()),
+            ("cell".into(), args.cell.display().to_string()),
+            ("calibration".into(), loaded.calibration_words()),
+        ],
+        gauge: loaded.cell.gauge,
+        target: loaded.cell.target,
+        max_rejected_share: loaded.cell.recording.max_rejected_share,
+        control: None,
+    })?;
+    let total = recorded.source.expected_frames();
+    let progress = Progress::new("measuring", "frames", total, voice.quiet);
+    let bench = Bench { loaded: &loaded, robot_z: recorded.robot_z.as_ref(), progress, log };
+    let summary = bench.measure_all(recorded.source, &stop)?;
+    Ok(conclude(args, &summary, &loaded))
+}
+
+fn wrong_input(error: SourceError) -> WrongArguments {
+    WrongArguments::new(format!("{}: {}", error.source_name, error.what))
+}
+
+/// Where frames are measured one after the other.
+struct Bench<'a> {
+    loaded: &'a LoadedCell,
+    robot_z: Option<&'a RobotZ>,
+    progress: Progress,
+    log: RunLog,
+}
+
+impl Bench<'_> {
+    /// Reads in a thread of its own, measures here. A source that fails in
+    /// the middle ends the work with what there is, and says so.
+    fn measure_all(
+        mut self,
+        mut source: Box<dyn FrameSource>,
+        stop: &StopSignal,
+    ) -> anyhow::Result<Summary> {
+        let (send, frames) = bounded(WAITING);
+        let ending = AtomicBool::new(false);
+        let failed = std::thread::scope(|scope| -> anyhow::Result<Option<SourceError>> {
+            let ending = &ending;
+            let reader = scope.spawn(move || read(source.as_mut(), &send, ending));
+            let mut unreadable = 0;
+            let mut measurer = Measurer::new(self.loaded.cell.gauge, self.loaded.cell.white);
+            for grab in &frames {
+                if stop.asked() {
+                    break;
+                }
+                if matches!(grab, Grab::Unreadable { .. }) {
+                    unreadable += 1;
+                }
+                self.measure(&mut measurer, grab, unreadable).inspect_err(|_| {
+                    ending.store(true, Ordering::Relaxed);
+                })?;
+            }
+            ending.store(true, Ordering::Relaxed);
+            drop(frames);
+            Ok(reader.join().unwrap_or_default())
+        })?;
+        if stop.asked() {
+            self.log.note(&Note::Remark("ended before the last frame, as was asked".into()));
+        }
+        if let Some(error) = failed {
+            eprintln!("warning: {error}; what was measured until then is kept");
+            self.log.note(&Note::Remark(error.to_string()));
+        }
+        self.progress.finish();
+        Ok(self.log.finish()?)
+    }
+
+    fn measure(
+        &mut self,
+        measurer: &mut Measurer,
+        grab: Grab,
+        unreadable: u64,
+    ) -> anyhow::Result<()> {
+        match grab {
+            Grab::Frame { frame, time_s } => {
+                let robot_z = self.robot_z.and_then(|z| z.z_at(frame.captured_at));
+                let outcome = measurer
+                    .measure(&frame, &self.loaded.surface(robot_z))
+                    .map_err(|reject| reject.status());
+                let row = FrameRow { frame: frame.seq, time_s, outcome, control: None };
+                self.log.frame(&row, Some(&frame), Some(measurer.edges()))?;
+            }
+            Grab::Unreadable { seq, time_s, reason } => {
+                if unreadable <= NAMED {
+                    self.progress.note(&format!("unreadable: {reason}"));
+                    self.log.note(&Note::Remark(format!("frame {seq} is unreadable: {reason}")));
+                }
+                let outcome = Err(Reject::Unreadable.status());
+                let row = FrameRow { frame: seq, time_s, outcome, control: None };
+                self.log.frame(&row, None, None)?;
+            }
+        }
+        self.progress.advance();
+        Ok(())
+    }
+}
+
+/// Gives every frame on until there are no more or nobody wants them.
+fn read(
+    source: &mut dyn FrameSource,
+    send: &Sender<Grab>,
+    ending: &AtomicBool,
+) -> Option<SourceError> {
+    while !ending.load(Ordering::Relaxed) {
+        match source.next_frame() {
+            Ok(Some(grab)) => send.send(grab).ok()?,
+            Ok(None) => return None,
+            Err(error) => return Some(error),
+        }
+    }
+    None
+}
+
+fn conclude(args: &ProcessArgs, summary: &Summary, loaded: &LoadedCell) -> ExitCode {
+    println!("{} frames, {} measured", summary.frames, summary.measured);
+    for (reason, count) in &summary.rejected {
+        println!("  {count} {reason}");
+    }
+    if let (Some(mean), Some(std)) = (summary.width_mean_mm, summary.width_std_mm) {
+        println!("width {mean:.3} mm on average, standard deviation {std:.3} mm");
+    }
+    println!("{}", args.out.join("report.html").display());
+    let share = summary.rejected_share();
+    let most = loaded.cell.recording.max_rejected_share;
+    if share > most {
+        eprintln!(
+            "warning: {:.1} % of the frames were refused, the cell bears {:.1} %",
+            share * 100.0,
+            most * 100.0
+        );
+        return ExitCode::from(WITH_LOSS);
+    }
+    ExitCode::SUCCESS
+}
