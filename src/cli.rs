@@ -65,7 +65,7 @@ pub struct WrongArguments(String);
 
 impl WrongArguments {
     /// With what was found and what was expected.
-    pub fn new(what: impl ToString) -> Self {
+    pub fn new(what: &impl ToString) -> Self {
         Self(what.to_string())
     }
 }

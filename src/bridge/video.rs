@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use opencv::core::{CV_8U, CV_16U, Mat, MatTraitConst, MatTraitConstManual};
 use opencv::videoio::{
-    CAP_ANY, CAP_GSTREAMER, CAP_PROP_BUFFERSIZE, CAP_PROP_CODEC_PIXEL_FORMAT, CAP_PROP_CONVERT_RGB,
-    CAP_PROP_FPS, CAP_PROP_FRAME_COUNT, VideoCapture, VideoCaptureTrait, VideoCaptureTraitConst,
+    CAP_FFMPEG, CAP_GSTREAMER, CAP_PROP_BUFFERSIZE, CAP_PROP_CODEC_PIXEL_FORMAT,
+    CAP_PROP_CONVERT_RGB, CAP_PROP_FPS, CAP_PROP_FRAME_COUNT, CAP_V4L2, VideoCapture,
+    VideoCaptureTrait, VideoCaptureTraitConst,
 };
 
 use super::{BridgeError, during, prepare};
@@ -40,9 +41,11 @@ impl VideoReader {
     /// for it.
     pub fn open(input: &VideoInput) -> Result<Self, BridgeError> {
         prepare();
+        // Asked by name: `CAP_ANY` would go on to GStreamer, which takes its
+        // time to refuse a file or a device, and complains on standard error.
         let capture = match input {
-            VideoInput::File(path) => VideoCapture::from_file(path, CAP_ANY),
-            VideoInput::Camera(index) => VideoCapture::new(*index, CAP_ANY),
+            VideoInput::File(path) => VideoCapture::from_file(path, CAP_FFMPEG),
+            VideoInput::Camera(index) => VideoCapture::new(*index, CAP_V4L2),
             VideoInput::Pipeline(text) => {
                 let sink = if text.contains("appsink") { "" } else { APPSINK };
                 VideoCapture::from_file(format!("{text}{sink}"), CAP_GSTREAMER)
@@ -112,14 +115,16 @@ fn refusal(input: &VideoInput) -> &'static str {
     }
 }
 
-/// Asks for grey pictures of more than 8 bits as they are stored; by default
-/// every picture is turned into 8-bit colour.
+/// Asks for 16-bit grey pictures as they are stored; by default every picture
+/// is turned into 8-bit colour. OpenCV can from 4.7 on.
 fn keep_grey_grey(capture: &mut VideoCapture) {
     let deep_grey = f64::from(u32::from_le_bytes(*b"Y1\0\x10"));
     let format = capture.get(CAP_PROP_CODEC_PIXEL_FORMAT).unwrap_or(-1.0);
-    if (format - deep_grey).abs() < 0.5 {
-        // Where it is refused, the pictures come with 8 bits.
-        drop(capture.set(CAP_PROP_CONVERT_RGB, 0.0));
+    let is_deep = (format - deep_grey).abs() < 0.5;
+    if is_deep && !capture.set(CAP_PROP_CONVERT_RGB, 0.0).unwrap_or(false) {
+        tracing::warn!(
+            "this OpenCV reads 16-bit grey videos with 8 bits; images or an MCAP keep all 16"
+        );
     }
 }
 

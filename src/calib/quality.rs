@@ -98,9 +98,9 @@ fn outliers(views: &[View]) -> impl Iterator<Item = Doubt> {
     let mut errors: Vec<f64> = views.iter().map(|view| view.rms_px).collect();
     errors.sort_by(f64::total_cmp);
     let typical = errors.get(errors.len() / 2).copied().unwrap_or(f64::INFINITY);
-    views.iter().map(move |view| (view, view.rms_px / typical)).filter_map(|(view, times)| {
-        (times > OUTLIER).then(|| Doubt::Outlier { name: view.name.clone(), times })
-    })
+    let times = move |view: &View| view.rms_px / typical;
+    let worse = views.iter().filter(move |view| times(view) > OUTLIER);
+    worse.map(move |view| Doubt::Outlier { name: view.name.clone(), times: times(view) })
 }
 
 /// Angle between the board's normal and the camera's view \[degrees\].
@@ -124,4 +124,55 @@ fn covered_cells(solution: &Solution) -> usize {
         seen[index(corner.y, height)][index(corner.x, width)] = true;
     }
     seen.iter().flatten().filter(|&&cell| cell).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calib::Camera;
+    use crate::geometry::{ImagePoint, Pose};
+
+    fn view(name: &str, corner: ImagePoint, tilt_rad: f64, rms_px: f64) -> View {
+        let pose = Pose::new(Vector3::new(tilt_rad, 0.0, 0.0), Vector3::new(0.0, 0.0, 400.0));
+        View { name: name.into(), pose, rms_px, max_px: rms_px, corners_px: vec![corner] }
+    }
+
+    fn solution(views: Vec<View>) -> Solution {
+        let (focal_px, centre_px) = ([1000.0; 2], [50.0; 2]);
+        Solution {
+            camera: Camera { focal_px, centre_px, distortion: [0.0; 5] },
+            sigma: [1.0; 9],
+            image_size_px: [100, 100],
+            rms_px: 0.2,
+            views,
+        }
+    }
+
+    /// Sixteen views that see a part of the picture each.
+    fn good() -> Vec<View> {
+        let at = |i: u32| ImagePoint::new(f64::from(i % 4) * 25.0 + 5.0, f64::from(i / 4) * 25.0);
+        (0..16).map(|i| view(&i.to_string(), at(i), 0.03 * f64::from(i), 0.2)).collect()
+    }
+
+    #[test]
+    fn many_tilted_views_all_over_the_picture_raise_no_doubt() {
+        assert_eq!(doubts(&solution(good())), vec![]);
+    }
+
+    #[test]
+    fn each_weakness_is_told() {
+        let mut odd = good();
+        odd[4].rms_px = 0.9;
+        let outlier = Doubt::Outlier { name: "4".into(), times: 0.9 / 0.2 };
+        assert_eq!(doubts(&solution(odd)), vec![outlier]);
+        let same = |_| view("a", ImagePoint::new(50.0, 50.0), 0.1, 0.2);
+        let told = doubts(&solution((0..5).map(same).collect()));
+        assert!(matches!(
+            told[..],
+            [Doubt::FewViews { found: 5 }, Doubt::Coverage { covered: 1 }, Doubt::NoTilt { .. }]
+        ));
+        let loose = Solution { sigma: [20.0; 9], rms_px: 0.8, ..solution(good()) };
+        let told = doubts(&loose);
+        assert!(matches!(told[..], [Doubt::HighError { .. }, Doubt::LooseFocal { .. }]));
+    }
 }
