@@ -25,8 +25,8 @@ pub enum Grab {
     Frame {
         /// The picture.
         frame: Frame,
-        /// Seconds since the source's first frame, where the source knows
-        /// them.
+        /// Seconds since the source's first frame, or as the source's own
+        /// table of times has them; `None` where it knows none.
         time_s: Option<f64>,
     },
     /// There should be a picture, but it cannot be read.

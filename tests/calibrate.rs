@@ -5,8 +5,11 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use nalgebra::Point2;
+use truebead::bridge::find_board;
 use truebead::calib::Calibration;
-use truebead::io::calibration_file;
+use truebead::frame::Channel;
+use truebead::io::{calibration_file, image_file};
+use truebead::time::Stamp;
 use truebead::units::Mm;
 
 /// Thirteen pictures of a board with 9x6 inner corners, of squares of 25 mm, if
@@ -50,6 +53,17 @@ fn the_squares_have_their_size_at_any_height_of_the_board() {
     let out = scratch.path().join("calib.toml");
     calibrate(&folder, &out, &["--plane", "left04.jpg"]).assert().success();
     let on_bed = calibration_file::read(&out).unwrap().surface(Mm::ZERO, None);
+    let picture =
+        image_file::read(&folder.join("left04.jpg"), Channel::Grey, 0, Stamp::START).unwrap();
+    let corners = find_board(&picture, (9, 6)).unwrap().unwrap();
+    for row in corners.chunks(9) {
+        for pair in row.windows(2) {
+            let side = (on_bed.to_mm(pair[1]).unwrap() - on_bed.to_mm(pair[0]).unwrap()).norm();
+            assert!((side - 25.0).abs() < 0.35, "a square of 25 mm measures {side} mm");
+        }
+        let length = (on_bed.to_mm(row[8]).unwrap() - on_bed.to_mm(row[0]).unwrap()).norm();
+        assert!((length - 200.0).abs() < 0.35, "eight squares measure {length} mm");
+    }
     // A board that is 8 mm thick lies on a bed that is 8 mm deeper: its face is
     // the same plane, measured as a surface 8 mm above the bed.
     let thick = ["--plane", "left04.jpg", "--board-thickness-mm", "8"];

@@ -5,6 +5,7 @@
 use nalgebra::Vector3;
 
 use super::solve::{Solution, View};
+use crate::geometry::ImagePoint;
 
 /// A reason for doubt, and what to do about it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -50,6 +51,17 @@ pub enum Doubt {
         /// Its error over the median error.
         times: f64,
     },
+    /// The distortion polynomial turns over within the picture.
+    #[error(
+        "the lens model folds over before pixel ({x:.0}, {y:.0}), and nothing can be measured \
+         there; bring the board into the corners of the picture"
+    )]
+    Folds {
+        /// Column \[px\].
+        x: f64,
+        /// Row \[px\].
+        y: f64,
+    },
     /// The focal length is loose.
     #[error("the focal length is known to {percent:.1} % only; more tilted pictures help")]
     LooseFocal {
@@ -90,6 +102,9 @@ pub fn doubts(solution: &Solution) -> Vec<Doubt> {
     if percent > GOOD_FOCAL_PERCENT {
         doubts.push(Doubt::LooseFocal { percent });
     }
+    if let Some(px) = first_pixel_without_ray(solution) {
+        doubts.push(Doubt::Folds { x: px.x, y: px.y });
+    }
     doubts.extend(outliers(&solution.views));
     doubts
 }
@@ -101,6 +116,16 @@ fn outliers(views: &[View]) -> impl Iterator<Item = Doubt> {
     let times = move |view: &View| view.rms_px / typical;
     let worse = views.iter().filter(move |view| times(view) > OUTLIER);
     worse.map(move |view| Doubt::Outlier { name: view.name.clone(), times: times(view) })
+}
+
+/// A corner of the picture or the middle of a side that the distortion
+/// polynomial does not reach.
+fn first_pixel_without_ray(solution: &Solution) -> Option<ImagePoint> {
+    let [right, bottom] = solution.image_size_px.map(|side| f64::from(side) - 1.0);
+    let along = |i: u32, end: f64| f64::from(i) / 2.0 * end;
+    (0..9)
+        .map(|i| ImagePoint::new(along(i % 3, right), along(i / 3, bottom)))
+        .find(|&px| solution.camera.ray(px).is_none())
 }
 
 /// Angle between the board's normal and the camera's view \[degrees\].
@@ -130,7 +155,7 @@ fn covered_cells(solution: &Solution) -> usize {
 mod tests {
     use super::*;
     use crate::calib::Camera;
-    use crate::geometry::{ImagePoint, Pose};
+    use crate::geometry::Pose;
 
     fn view(name: &str, corner: ImagePoint, tilt_rad: f64, rms_px: f64) -> View {
         let pose = Pose::new(Vector3::new(tilt_rad, 0.0, 0.0), Vector3::new(0.0, 0.0, 400.0));
@@ -171,6 +196,9 @@ mod tests {
             told[..],
             [Doubt::FewViews { found: 5 }, Doubt::Coverage { covered: 1 }, Doubt::NoTilt { .. }]
         ));
+        let mut folded = solution(good());
+        folded.camera.distortion[0] = -200.0;
+        assert_eq!(doubts(&folded), vec![Doubt::Folds { x: 0.0, y: 0.0 }]);
         let loose = Solution { sigma: [20.0; 9], rms_px: 0.8, ..solution(good()) };
         let told = doubts(&loose);
         assert!(matches!(told[..], [Doubt::HighError { .. }, Doubt::LooseFocal { .. }]));

@@ -2,7 +2,7 @@
 
 mod report;
 
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -97,16 +97,22 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     let mut looks = look_at_all(&board, &files);
     solve::agree_on_size(&mut looks);
     let seen: Vec<Sighting> = looks.iter().filter_map(|(_, look)| look.clone().ok()).collect();
-    let solution = solve::solve(&board, &seen).inspect_err(|_| report::refusals(&looks))?;
-    report::images(&looks, &solution);
+    let solution = solve::solve(&board, &seen).inspect_err(|_| say(&report::refusals(&looks)))?;
+    say(&report::images(&looks, &solution));
     let plane = find_plane(args, &board, &solution, &looks)?;
     let calibration = write(args, &board, &solution, &plane)?;
-    report::camera(&solution);
-    report::plane(&plane);
-    report::scale(&calibration, plane.thickness);
-    report::doubts(&solution);
-    println!("\nwrote {}", args.out.display());
+    say(&report::camera(&solution));
+    say(&report::plane(&plane));
+    say(&report::scale(&calibration, plane.thickness));
+    say(&report::doubts(&solution));
+    say(&format!("\nwrote {}\n", args.out.display()));
     Ok(())
+}
+
+/// Writes to standard output. A reader that has gone away, such as `head`, is no
+/// reason to stop.
+fn say(text: &str) {
+    let _ = std::io::stdout().write_all(text.as_bytes());
 }
 
 /// Finds a mistyped image before the long work.

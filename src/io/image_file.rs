@@ -6,7 +6,7 @@ use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{DynamicImage, ImageBuffer, ImageError, ImageReader};
+use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat, ImageReader};
 
 use crate::frame::{Channel, Frame, Layout, Pixels, WrongSize};
 use crate::time::Stamp;
@@ -15,6 +15,9 @@ use crate::time::Stamp;
 /// lower case.
 pub const EXTENSIONS: [&str; 12] =
     ["png", "jpg", "jpeg", "tif", "tiff", "bmp", "pgm", "ppm", "pbm", "pnm", "pam", "webp"];
+
+const START_OF_SCAN: [u8; 2] = [0xff, 0xda];
+const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
 
 /// Bytes that are not a picture that can be measured.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +28,9 @@ pub enum DecodeError {
     /// The bytes do not begin as any of the formats that are known.
     #[error("it is not a PNG, JPEG, TIFF, BMP, PNM or WebP image")]
     UnknownFormat,
+    /// A JPEG without its end, whose missing part would be decoded as grey.
+    #[error("it is cut off before its end")]
+    CutOff,
     /// The format is known, the content is broken or not supported.
     #[error("it cannot be decoded: {0}")]
     Broken(#[source] ImageError),
@@ -106,12 +112,21 @@ pub fn decode(
     let reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
         .map_err(|error| DecodeError::Broken(ImageError::IoError(error)))?;
-    if reader.format().is_none() {
-        return Err(DecodeError::UnknownFormat);
+    match reader.format() {
+        None => return Err(DecodeError::UnknownFormat),
+        Some(ImageFormat::Jpeg) if is_cut_off(bytes) => return Err(DecodeError::CutOff),
+        Some(_) => {}
     }
     let image = reader.decode().map_err(DecodeError::Broken)?;
     let size = (image.width() as usize, image.height() as usize);
     Ok(Frame::new(seq, captured_at, size, grey_values(image, channel)?)?)
+}
+
+/// Whether a JPEG has no end after the beginning of its last scan. Its decoder
+/// fills what is missing and says nothing; the others fail.
+fn is_cut_off(jpeg: &[u8]) -> bool {
+    let last = |marker: [u8; 2]| jpeg.windows(2).rposition(|pair| pair == marker);
+    last(END_OF_IMAGE) < last(START_OF_SCAN)
 }
 
 fn grey_values(image: DynamicImage, channel: Channel) -> Result<Pixels, DecodeError> {
@@ -156,7 +171,6 @@ pub fn encode_png(frame: &Frame) -> Result<Vec<u8>, EncodeError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::ImageFormat;
 
     fn bytes_of(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
         let mut bytes = Cursor::new(Vec::new());
@@ -227,8 +241,13 @@ mod tests {
         let fault = |bytes: &[u8]| decode(bytes, Channel::Grey, 0, Stamp::START).unwrap_err();
         assert!(matches!(fault(b""), DecodeError::Empty));
         assert!(matches!(fault(b"frame,time_s\n"), DecodeError::UnknownFormat));
-        let whole = bytes_of(&DynamicImage::new_luma8(40, 30), ImageFormat::Png);
-        assert!(matches!(fault(&whole[..whole.len() / 2]), DecodeError::Broken(_)));
+        use ImageFormat::{Bmp, Jpeg, Png, Pnm, Tiff, WebP};
+        for format in [Png, Jpeg, Tiff, Bmp, Pnm, WebP] {
+            let whole = bytes_of(&DynamicImage::new_rgb8(64, 48), format);
+            assert!(decode(&whole, Channel::Grey, 0, Stamp::START).is_ok(), "{format:?}");
+            let cut = fault(&whole[..whole.len() * 3 / 4]);
+            assert!(matches!(cut, DecodeError::Broken(_) | DecodeError::CutOff), "{format:?}");
+        }
         let float = bytes_of(&DynamicImage::new_rgb32f(2, 2), ImageFormat::Tiff);
         assert!(fault(&float).to_string().contains("Rgb32F"));
         let missing = read(Path::new("no/such.png"), Channel::Grey, 0, Stamp::START).unwrap_err();
