@@ -5,13 +5,15 @@
 //! before the deadline the thread is left to itself and the camera is opened
 //! anew, with a growing delay, until it has failed too often in a row.
 
+mod worker;
+
 use std::fmt;
 use std::sync::Arc;
-use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TryRecvError, TrySendError, bounded};
+use crossbeam_channel::RecvTimeoutError;
 
+use self::worker::{Capture, News, Opener, Worker};
 use super::fault;
 use crate::bridge::{VideoInput, VideoReader};
 use crate::frame::{Channel, Frame};
@@ -32,15 +34,6 @@ pub struct Patience {
 const OPEN_WAIT: Duration = Duration::from_secs(10);
 const FIRST_DELAY: Duration = Duration::from_millis(100);
 const LONGEST_DELAY: Duration = Duration::from_secs(2);
-const FAREWELL: Duration = Duration::from_secs(1);
-
-/// Something that gives pictures; each call waits for the next one.
-trait Capture {
-    /// The next picture, numbered 0, with the moment at which it was there.
-    fn capture(&mut self) -> Result<Frame, String>;
-}
-
-type Opener = dyn Fn() -> Result<Box<dyn Capture>, String> + Send + Sync;
 
 /// A live camera.
 pub struct Live {
@@ -193,81 +186,6 @@ impl Capture for Device {
     }
 }
 
-enum News {
-    Frame(Frame),
-    Failed(String),
-}
-
-/// The thread that reads a camera. It ends when its `stay` is dropped, at the
-/// latest with the picture for which it waits.
-struct Worker {
-    news: Receiver<News>,
-    stay: Sender<()>,
-    thread: JoinHandle<()>,
-}
-
-impl Worker {
-    fn start(name: &str, opener: &Arc<Opener>, delay: Duration) -> Result<Self, SourceError> {
-        let (slot, news) = bounded(1);
-        let (stay, stop) = bounded(0);
-        let (opener, old) = (Arc::clone(opener), news.clone());
-        let thread = thread::Builder::new()
-            .name("camera".to_owned())
-            .spawn(move || {
-                if matches!(stop.recv_timeout(delay), Err(RecvTimeoutError::Timeout)) {
-                    read_until_stopped(opener.as_ref(), &stop, &slot, &old);
-                }
-            })
-            .map_err(|error| fault(name, format!("cannot start a thread: {error}")))?;
-        Ok(Self { news, stay, thread })
-    }
-
-    /// Leaves a thread to itself that may be stuck in a driver.
-    fn abandon(self) {
-        drop(self.stay);
-    }
-
-    fn stop(self) {
-        drop(self.stay);
-        loop {
-            match self.news.recv_timeout(FAREWELL) {
-                Ok(_) => {}
-                Err(RecvTimeoutError::Timeout) => return,
-                Err(RecvTimeoutError::Disconnected) => break,
-            }
-        }
-        // A panic there has been reported as a lost camera.
-        drop(self.thread.join());
-    }
-}
-
-fn read_until_stopped(
-    opener: &Opener,
-    stop: &Receiver<()>,
-    slot: &Sender<News>,
-    old: &Receiver<News>,
-) {
-    let mut camera = match opener() {
-        Ok(camera) => camera,
-        Err(why) => return put(slot, old, News::Failed(why)),
-    };
-    while matches!(stop.try_recv(), Err(TryRecvError::Empty)) {
-        match camera.capture() {
-            Ok(frame) => put(slot, old, News::Frame(frame)),
-            Err(why) => return put(slot, old, News::Failed(why)),
-        }
-    }
-}
-
-/// Puts news into the slot; what waits there and is older gives way.
-fn put(slot: &Sender<News>, old: &Receiver<News>, news: News) {
-    let mut news = news;
-    while let Err(TrySendError::Full(back)) = slot.try_send(news) {
-        drop(old.try_recv());
-        news = back;
-    }
-}
-
 fn duration(span: Span) -> Duration {
     Duration::from_nanos(u64::try_from(span.ns()).unwrap_or(0))
 }
@@ -279,8 +197,10 @@ fn delay_after(failures: u32) -> Duration {
 
 #[cfg(test)]
 mod tests {
+    use super::worker::put;
     use super::*;
     use crate::frame::Pixels;
+    use crossbeam_channel::{Receiver, Sender, bounded};
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// Gives pictures on demand of the test: one for every message.
