@@ -65,7 +65,8 @@ pub struct WrongArguments(String);
 
 impl WrongArguments {
     /// With what was found and what was expected.
-    pub fn new(what: &impl ToString) -> Self {
+    #[expect(clippy::needless_pass_by_value, reason = "an error or a new text at every call")]
+    pub fn new(what: impl ToString) -> Self {
         Self(what.to_string())
     }
 }

@@ -86,13 +86,12 @@ type Looks = Vec<(String, Result<Sighting, Refusal>)>;
 /// without writing anything where no calibration can be found.
 pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     let (columns, rows) = args.board;
-    let board =
-        Board::new(columns, rows, args.square_mm).map_err(|error| WrongArguments::new(&error))?;
+    let board = Board::new(columns, rows, args.square_mm).map_err(WrongArguments::new)?;
     if args.board_thickness_mm < Mm::ZERO {
-        return Err(WrongArguments::new(&"the board's thickness cannot be below 0 mm").into());
+        return Err(WrongArguments::new("the board's thickness cannot be below 0 mm").into());
     }
     let files = list_images(&args.input)
-        .map_err(|error| WrongArguments::new(&format!("{}: {}", error.source_name, error.what)))?;
+        .map_err(|error| WrongArguments::new(format!("{}: {}", error.source_name, error.what)))?;
     check_plane(args.plane.as_deref(), &files)?;
     let mut looks = look_at_all(&board, &files);
     solve::agree_on_size(&mut looks);
@@ -123,7 +122,7 @@ fn check_plane(plane: Option<&Path>, files: &[PathBuf]) -> Result<(), WrongArgum
                 "--plane {}: no such image in the folder, and no such file",
                 path.display()
             );
-            Err(WrongArguments::new(&what))
+            Err(WrongArguments::new(what))
         }
         _ => Ok(()),
     }
