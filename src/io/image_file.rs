@@ -238,10 +238,10 @@ mod tests {
 
     #[test]
     fn what_is_no_picture_is_said_to_be_none() {
+        use ImageFormat::{Bmp, Jpeg, Png, Pnm, Tiff, WebP};
         let fault = |bytes: &[u8]| decode(bytes, Channel::Grey, 0, Stamp::START).unwrap_err();
         assert!(matches!(fault(b""), DecodeError::Empty));
         assert!(matches!(fault(b"frame,time_s\n"), DecodeError::UnknownFormat));
-        use ImageFormat::{Bmp, Jpeg, Png, Pnm, Tiff, WebP};
         for format in [Png, Jpeg, Tiff, Bmp, Pnm, WebP] {
             let whole = bytes_of(&DynamicImage::new_rgb8(64, 48), format);
             assert!(decode(&whole, Channel::Grey, 0, Stamp::START).is_ok(), "{format:?}");
