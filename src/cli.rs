@@ -10,6 +10,7 @@ pub mod cell;
 pub mod check;
 pub mod process;
 pub mod render;
+pub mod replay;
 pub mod robot_sim;
 
 use std::process::ExitCode;

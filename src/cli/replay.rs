@@ -1,0 +1,142 @@
+//! `truebead replay`: does today's controller answer as the recorded one did?
+
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::WrongArguments;
+use crate::config::Cell;
+use crate::config::cell::{Purpose, RunPart};
+use crate::control::Step;
+use crate::controller::{Controller, Setup};
+use crate::io::recording::{Entry, Recording};
+use crate::offline::replay::{Difference, ReplayReport, replay};
+
+/// Exit status of a replay that had to end before the recording did.
+const RECORDS_LOST: u8 = 3;
+/// Entries between two updates of the progress display.
+const PROGRESS_EVERY: u64 = 4096;
+
+const EXAMPLE: &str = "\
+Example:
+  truebead replay out/recording.mcap
+
+The controller is set up from the cell file that is attached to the recording.
+A recording that was cut short (recording.mcap.partial) is replayed as far as
+it goes.
+
+Exit status: 0 all steps are the same, 1 a step differs, 2 the file is not a
+recording that can be replayed, 3 events are missing from its middle.";
+
+/// Feeds the recorded events to the controller and compares its steps with the
+/// recorded ones, bit for bit.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLE)]
+pub struct ReplayArgs {
+    /// A recording of this program
+    #[arg(value_name = "RECORDING.mcap")]
+    recording: PathBuf,
+}
+
+/// Runs the command.
+pub fn run(args: &ReplayArgs) -> anyhow::Result<ExitCode> {
+    let mut recording = Recording::open(&args.recording).map_err(WrongArguments::new)?;
+    let mut controller = Controller::new(Setup::from(&recorded_cell(&recording)?));
+    let progress = progress_bar();
+    let report =
+        replay(with_progress(&mut recording, &progress), |now, event| controller.step(now, event));
+    progress.finish_and_clear();
+    let report = report.context("the replay ends here")?;
+    if let Some(what) = recording.integrity().summary() {
+        eprintln!("warning: {}: {what}", recording.file());
+    }
+    let status = tell(&report);
+    if report.compared == 0 && report.gap.is_none() {
+        bail!("{}: nothing to compare, it holds no steps", recording.file());
+    }
+    Ok(status)
+}
+
+/// What a run needs, from the cell file that is attached.
+fn recorded_cell(recording: &Recording) -> anyhow::Result<RunPart> {
+    let file = recording.file();
+    if recording.run().is_none() {
+        bail!(WrongArguments::new(format!(
+            "{file}: not a recording of truebead: it has no metadata record \"run\" at its start"
+        )));
+    }
+    let Some(text) = recording.cell() else {
+        bail!(WrongArguments::new(format!(
+            "{file}: the attachment cell.toml is missing, so the controller cannot be set up"
+        )));
+    };
+    let name = format!("cell.toml in {file}");
+    let cell = Cell::parse(Path::new(&name), text, Purpose::Run).map_err(WrongArguments::new)?;
+    cell.run.ok_or_else(|| {
+        WrongArguments::new(format!("{name}: it lacks tables that a run needs")).into()
+    })
+}
+
+fn progress_bar() -> ProgressBar {
+    if !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{spinner} replaying, {pos} entries, {elapsed}");
+    ProgressBar::new_spinner()
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()))
+}
+
+fn with_progress<'a, E>(
+    entries: impl Iterator<Item = Result<Entry, E>> + 'a,
+    progress: &'a ProgressBar,
+) -> impl Iterator<Item = Result<Entry, E>> + 'a {
+    (1u64..).zip(entries).map(|(count, entry)| {
+        if count.is_multiple_of(PROGRESS_EVERY) {
+            progress.set_position(count);
+            progress.tick();
+        }
+        entry
+    })
+}
+
+/// Prints how it went and gives the exit status.
+fn tell(report: &ReplayReport) -> ExitCode {
+    if let Some(difference) = &report.difference {
+        tell_difference(report.compared, difference);
+        return ExitCode::FAILURE;
+    }
+    println!("{} steps replayed, all the same bit for bit", report.compared);
+    if let Some(n) = report.unanswered {
+        println!("event {n} is the last; its step was not recorded any more");
+    }
+    if let Some(gap) = report.gap {
+        println!(
+            "the record of event {} is incomplete (event {} comes next), so the rest cannot be \
+             compared",
+            gap.expected, gap.found
+        );
+        return ExitCode::from(RECORDS_LOST);
+    }
+    ExitCode::SUCCESS
+}
+
+fn tell_difference(compared: u64, difference: &Difference) {
+    println!(
+        "step {} differs, {:.6} s after the start; the {} before it are the same",
+        difference.n,
+        difference.now.secs(),
+        compared.saturating_sub(1)
+    );
+    let json = |value: Result<String, serde_json::Error>| value.unwrap_or_else(|e| e.to_string());
+    println!("event    {}", json(serde_json::to_string(&difference.event)));
+    println!("recorded {}", step_json(&difference.recorded));
+    println!("replayed {}", step_json(&difference.replayed));
+}
+
+fn step_json(step: &Step) -> String {
+    serde_json::to_string(step).unwrap_or_else(|error| error.to_string())
+}
