@@ -18,6 +18,7 @@ mod encode;
 pub mod format;
 mod mux;
 pub mod sink;
+mod tap;
 mod writer;
 
 #[cfg(test)]
@@ -40,6 +41,7 @@ use encode::FrameJob;
 use format::{FORMAT_VERSION, RunInfo};
 use mux::Mux;
 use sink::{FileSink, Outlet, Sink};
+pub use tap::FrameTap;
 use writer::{Inputs, WriterThread};
 
 /// What is recorded about the run itself, and which frames.
@@ -138,28 +140,6 @@ impl Shared {
     }
 }
 
-/// Gives frames to the recorder, from any thread.
-#[derive(Clone)]
-pub struct FrameTap {
-    keep: KeepFrames,
-    jobs: Sender<FrameJob>,
-    shared: Arc<Shared>,
-}
-
-impl FrameTap {
-    /// Takes a frame if it is one that is kept and there is room for it; never
-    /// waits.
-    pub fn frame(&self, frame: Arc<Frame>) {
-        let wanted = match self.keep {
-            KeepFrames::None => false,
-            KeepFrames::Every(nth) => frame.seq.is_multiple_of(nth.max(1)),
-        };
-        if wanted && self.jobs.try_send(FrameJob::Encode(frame)).is_err() {
-            self.shared.frames_dropped.fetch_add(1, Ordering::Relaxed);
-        }
-    }
-}
-
 /// The recorder as the control thread holds it. Dropping it finishes the
 /// recording as [`Self::finish`] does, but tells nobody how that went.
 pub struct RecorderHandle {
@@ -238,19 +218,20 @@ impl Recorder for RecorderHandle {
             return Err(why.clone());
         }
         let item = Answered { n: self.next, now, event: event.clone(), step: step.clone() };
-        match self.answered.as_ref().map(|answered| answered.try_send(item)) {
-            Some(Ok(())) => {
+        let Some(answered) = &self.answered else {
+            return Err(shared.fail(RecordError("the recording is finished".to_string())));
+        };
+        let why = match answered.try_send(item) {
+            Ok(()) => {
                 self.next += 1;
-                Ok(())
+                return Ok(());
             }
-            Some(Err(TrySendError::Full(_))) => Err(shared.fail(RecordError(format!(
-                "the disk does not keep up: event {} finds the queue full",
-                self.next
-            )))),
-            Some(Err(TrySendError::Disconnected(_))) | None => {
-                Err(shared.fail(RecordError("the recorder has ended".to_string())))
+            Err(TrySendError::Full(_)) => {
+                format!("the disk does not keep up: event {} finds the queue full", self.next)
             }
-        }
+            Err(TrySendError::Disconnected(_)) => "the recorder has ended".to_string(),
+        };
+        Err(shared.fail(RecordError(why)))
     }
 }
 

@@ -4,7 +4,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ::mcap::records::{MessageHeader, Metadata};
 use ::mcap::write::NoSeek;
@@ -39,9 +39,19 @@ pub enum MuxError {
 #[derive(Debug, Clone, Default)]
 struct Shelf(Arc<Mutex<Vec<u8>>>);
 
+impl Shelf {
+    fn bytes(&self) -> MutexGuard<'_, Vec<u8>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn len(&self) -> usize {
+        self.bytes().len()
+    }
+}
+
 impl Write for Shelf {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(bytes);
+        self.bytes().extend_from_slice(bytes);
         Ok(bytes.len())
     }
 
@@ -64,7 +74,7 @@ pub struct Mux {
     channels: Channels,
     epoch_ns: u64,
     counts: Counts,
-    flushed: Counts,
+    complete: Counts,
 }
 
 impl Mux {
@@ -104,7 +114,7 @@ impl Mux {
             channels,
             epoch_ns: run.epoch_ns,
             counts: Counts::default(),
-            flushed: Counts::default(),
+            complete: Counts::default(),
         })
     }
 
@@ -131,27 +141,26 @@ impl Mux {
     /// Ends the chunk, so that everything so far comes out of [`Self::take`].
     pub fn flush(&mut self) -> Result<(), MuxError> {
         self.writer.flush()?;
-        self.flushed = self.counts;
+        self.complete = self.counts;
         Ok(())
     }
 
     /// Ends the recording with its index.
     pub fn finish(&mut self) -> Result<(), MuxError> {
         self.writer.finish()?;
-        self.flushed = self.counts;
+        self.complete = self.counts;
         Ok(())
     }
 
     /// Moves what has been written to the end of `bytes`; it ends with a whole
     /// record.
     pub fn take(&mut self, bytes: &mut Vec<u8>) {
-        bytes.append(&mut self.shelf.0.lock().unwrap_or_else(PoisonError::into_inner));
+        bytes.append(&mut self.shelf.bytes());
     }
 
-    /// What has been added up to the last [`Self::flush`] or
-    /// [`Self::finish`]. Chunks that ended in between hold more.
-    pub fn flushed_counts(&self) -> Counts {
-        self.flushed
+    /// What is in the chunks that are complete.
+    pub fn complete(&self) -> Counts {
+        self.complete
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "MCAP counts messages modulo 2^32")]
@@ -169,7 +178,13 @@ impl Mux {
             log_time: wall_ns,
             publish_time: wall_ns,
         };
-        Ok(self.writer.write_to_known_channel(&header, data)?)
+        let before = self.shelf.len();
+        self.writer.write_to_known_channel(&header, data)?;
+        if self.shelf.len() > before {
+            // The chunk was full and ended just before this message.
+            self.complete = self.counts;
+        }
+        Ok(())
     }
 }
 

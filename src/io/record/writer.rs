@@ -117,7 +117,7 @@ impl<S: Sink> WriterThread<S> {
     fn push(&mut self) {
         self.mux.take(self.outlet.waiting());
         match self.outlet.push() {
-            Ok(()) => self.safe = self.mux.flushed_counts(),
+            Ok(()) => self.safe = self.mux.complete(),
             Err(error) => self.fail("write", &error),
         }
     }

@@ -42,11 +42,13 @@ impl Integrity {
     pub fn summary(&self) -> Option<String> {
         let mut parts = Vec::new();
         if let Some(at) = self.breaks_off_at {
-            parts.push(format!(
-                "it was not finished: it breaks off at byte {at}, {} bytes of a record that is \
-                 not whole are left out",
-                self.lost_bytes
-            ));
+            parts.push(match self.lost_bytes {
+                0 => format!("it was not finished and ends at byte {at}"),
+                lost => format!(
+                    "it was not finished: its last {lost} bytes, from byte {at} on, are not a \
+                     whole record and are left out"
+                ),
+            });
         }
         if self.damaged > 0 {
             parts.push(format!(

@@ -112,6 +112,19 @@ fn cut_anywhere_everything_before_the_cut_chunk_reads_back() {
 }
 
 #[test]
+fn a_short_recording_reads_back_cut_at_every_single_byte() {
+    let bytes = record(20, 2);
+    let mut before = 0;
+    for cut in ::mcap::MAGIC.len()..bytes.len() {
+        let read = read(&bytes[..cut]);
+        assert!(is_beginning(&read.events) && read.events.len() >= before, "cut at {cut}");
+        assert!(!read.integrity.finished && read.integrity.damaged == 0, "cut at {cut}");
+        before = read.events.len();
+    }
+    assert_eq!(before, 20);
+}
+
+#[test]
 fn before_the_magic_is_whole_it_is_no_recording() {
     let whole = record(1, 1);
     for cut in 0..::mcap::MAGIC.len() {

@@ -1,0 +1,33 @@
+//! Where frames enter the recorder.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use crossbeam_channel::Sender;
+
+use super::Shared;
+use super::encode::FrameJob;
+use crate::config::cell::KeepFrames;
+use crate::frame::Frame;
+
+/// Gives frames to the recorder, from any thread.
+#[derive(Clone)]
+pub struct FrameTap {
+    pub(super) keep: KeepFrames,
+    pub(super) jobs: Sender<FrameJob>,
+    pub(super) shared: Arc<Shared>,
+}
+
+impl FrameTap {
+    /// Takes a frame if it is one that is kept and there is room for it; never
+    /// waits.
+    pub fn frame(&self, frame: Arc<Frame>) {
+        let wanted = match self.keep {
+            KeepFrames::None => false,
+            KeepFrames::Every(nth) => frame.seq.is_multiple_of(nth.max(1)),
+        };
+        if wanted && self.jobs.try_send(FrameJob::Encode(frame)).is_err() {
+            self.shared.frames_dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
