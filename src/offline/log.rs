@@ -96,7 +96,7 @@ impl RunLog {
         self.charts.step(now, event, step);
         match event {
             Event::LinkDown { reason } => {
-                self.remark(now, "the link to the robot was lost", reason)
+                self.remark(now, "the link to the robot was lost", reason);
             }
             Event::CameraLost { reason } => {
                 self.remark(now, "the camera gives no more frames", reason);

@@ -60,28 +60,28 @@ pub fn make_folder(folder: &Path) -> Result<(), LogError> {
 #[derive(Debug)]
 pub struct Partial {
     file: File,
-    partial: PathBuf,
+    growing: PathBuf,
     path: PathBuf,
 }
 
 impl Partial {
     /// Begins a file in a folder; a rest of the same name is overwritten.
     pub fn create(folder: &Path, name: &str) -> Result<Self, LogError> {
-        let partial = folder.join(format!("{name}.partial"));
-        let file = File::create(&partial)
-            .map_err(|source| LogError::Write { path: partial.clone(), source })?;
-        Ok(Self { file, partial, path: folder.join(name) })
+        let growing = folder.join(format!("{name}.partial"));
+        let file = File::create(&growing)
+            .map_err(|source| LogError::Write { path: growing.clone(), source })?;
+        Ok(Self { file, growing, path: folder.join(name) })
     }
 
     /// The error that this file meets.
     pub fn error(&self, source: io::Error) -> LogError {
-        LogError::Write { path: self.partial.clone(), source }
+        LogError::Write { path: self.growing.clone(), source }
     }
 
     /// Gives the file its final name.
     pub fn finish(self) -> Result<PathBuf, LogError> {
         self.file.sync_all().map_err(|source| self.error(source))?;
-        match fs::rename(&self.partial, &self.path) {
+        match fs::rename(&self.growing, &self.path) {
             Ok(()) => Ok(self.path),
             Err(source) => Err(LogError::Write { path: self.path, source }),
         }
@@ -101,7 +101,7 @@ impl Write for Partial {
 /// Writes a file whose content is at hand. A failure leaves nothing behind.
 pub fn write_whole(folder: &Path, name: &str, content: &[u8]) -> Result<PathBuf, LogError> {
     let mut partial = Partial::create(folder, name)?;
-    let leftover = partial.partial.clone();
+    let leftover = partial.growing.clone();
     let written = match partial.write_all(content) {
         Ok(()) => partial.finish(),
         Err(source) => Err(partial.error(source)),

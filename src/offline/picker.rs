@@ -139,7 +139,7 @@ fn draw(kept: &Kept) -> Option<Chosen> {
     }
     match &kept.snapshot.outcome {
         Ok(measured) => {
-            parts.push(format!("{:.3} ± {:.3} mm", measured.width.get(), measured.sigma.get()))
+            parts.push(format!("{:.3} ± {:.3} mm", measured.width.get(), measured.sigma.get()));
         }
         Err(status) => parts.push(format!("refused: {}", spoken(status))),
     }

@@ -1,6 +1,13 @@
 //! A made-up run for the tests: a sine of a width, every state, a limit,
 //! refused frames, pictures. The same every time.
 
+#![expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "small numbers of a made-up run"
+)]
+
 use std::path::Path;
 
 use super::log::{ControlFacts, LogOptions, RunLog};
@@ -55,7 +62,7 @@ pub fn options(folder: &Path, title: &str, with_control: bool) -> LogOptions {
 }
 
 /// A number between −1 and 1 that looks like chance (the finaliser of
-/// SplitMix64).
+/// `SplitMix64`).
 fn chance(seed: u64) -> f64 {
     let mut z = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -210,6 +217,35 @@ pub fn process(folder: &Path) -> Summary {
         let found = Edges { left: &edges[0], right: &edges[1] };
         let row = FrameRow { frame, time_s: None, outcome, control: None };
         log.frame(&row, picture.as_ref(), outcome.is_ok().then_some(found)).unwrap();
+    }
+    log.finish().unwrap()
+}
+
+pub const HOURS_OF_FRAMES: u64 = 100_000;
+
+/// Three hours at ten frames a second, without pictures.
+pub fn hours(folder: &Path) -> Summary {
+    let mut log = RunLog::create(options(folder, "A long run", true)).unwrap();
+    for frame in 0..HOURS_OF_FRAMES {
+        let time = frame as f64 * 0.1;
+        let path = time * 80.0;
+        let tracking = Step { state: State::Tracking, ..Step::default() };
+        let step = if frame.is_multiple_of(2) { &setpoint(15.0) } else { &tracking };
+        log.step(Stamp::from_secs(time), &robot(15.0 + (time * 0.01).sin(), path), step);
+        let spike = if frame == 54_321 { 6.0 } else { 0.0 };
+        let width = 42.0 + 0.3 * chance(frame) + spike;
+        let lost = frame % 997 == 0;
+        let outcome = if lost { Err("no_pair") } else { Ok(measured(frame, width)) };
+        let control = ControlColumns {
+            bead_path: Mm::new(path - MM_BEHIND).ok(),
+            nozzle_path: Mm::new(path).ok(),
+            speed: MmPerS::new(80.0).ok(),
+            setpoint: MmPerS::new(80.0).ok(),
+            state: "tracking",
+            limit: Limit::None,
+        };
+        let row = FrameRow { frame, time_s: Some(time), outcome, control: Some(control) };
+        log.frame(&row, None, None).unwrap();
     }
     log.finish().unwrap()
 }

@@ -2,6 +2,8 @@
 //! with every kind of colour vision (Okabe and Ito, "Color Universal Design",
 //! 2008, with two purples for the speeds).
 
+use std::fmt::Write as _;
+
 /// A colour as red, green and blue.
 pub type Rgb = [u8; 3];
 
@@ -32,7 +34,7 @@ pub const SETPOINT: Ink = ink("setpoint", [204, 121, 167], [156, 86, 134]);
 /// Speed that the controller would like.
 pub const DEMAND: Ink = ink("demand", [150, 150, 158], [128, 132, 142]);
 /// Limits of the cell, and the time during which one acts.
-pub const LIMIT: Ink = ink("limit", [200, 130, 0], [230, 159, 0]);
+pub const LIMIT: Ink = ink("limit", [128, 114, 20], [204, 194, 92]);
 /// Refused frames.
 pub const REJECTED: Ink = ink("rejected", [213, 94, 0], [236, 122, 38]);
 /// The robot is not printing.
@@ -64,26 +66,20 @@ impl Ink {
     }
 }
 
-/// The colour of a controller's state, by its name.
-pub fn state(name: &str) -> Ink {
-    match name {
-        "priming" => PRIMING,
-        "tracking" => TRACKING,
-        "holding" => HOLDING,
-        "fault" => FAULT,
-        _ => IDLE,
-    }
+/// The colour of a controller's state, by its name; none of another name.
+pub fn state(name: &str) -> Option<Ink> {
+    [IDLE, PRIMING, TRACKING, HOLDING, FAULT].into_iter().find(|ink| ink.name == name)
 }
 
 /// The style sheet's variables, for light and dark pages.
 pub fn variables() -> String {
-    let list = |pick: fn(&Ink) -> Rgb| -> String {
-        ALL.iter()
-            .map(|ink| {
-                let [red, green, blue] = pick(ink);
-                format!("--{}:#{red:02x}{green:02x}{blue:02x};", ink.name)
-            })
-            .collect()
+    let list = |pick: fn(&Ink) -> Rgb| {
+        ALL.iter().fold(String::new(), |mut list, ink| {
+            let [red, green, blue] = pick(ink);
+            // Writing to a string cannot fail.
+            let _ = write!(list, "--{}:#{red:02x}{green:02x}{blue:02x};", ink.name);
+            list
+        })
     };
     format!(
         ":root{{{}}}\n@media (prefers-color-scheme: dark){{:root{{{}}}}}\n",

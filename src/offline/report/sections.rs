@@ -30,7 +30,7 @@ pub fn over_time(report: &Report<'_>) -> Markup {
             @if report.summary.control.is_some() {
                 (speed_plot(report, &axis, |twice| &twice.time))
                 (strips::draw(&axis, &[
-                    Row { name: "state", strip: &charts.states, ink: state },
+                    Row { name: "state", strip: &charts.states, ink: palette::state },
                     Row { name: "limit", strip: &charts.limits, ink: limit },
                 ]))
                 (legend(&[
@@ -234,10 +234,6 @@ fn legend(entries: &[(&str, Ink, &str)]) -> Markup {
 
 fn refused(name: &str) -> Option<Ink> {
     (name != "ok").then_some(palette::REJECTED)
-}
-
-fn state(name: &str) -> Option<Ink> {
-    Some(palette::state(name))
 }
 
 fn limit(name: &str) -> Option<Ink> {

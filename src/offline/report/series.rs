@@ -174,8 +174,8 @@ mod tests {
         #[test]
         fn extremes_are_kept(values in prop::collection::vec(-1e6..1e6, 1..5000)) {
             let mut series = Series::default();
-            for (i, y) in values.iter().enumerate() {
-                series.push(i as f64, *y);
+            for (i, y) in (0_u32..).zip(&values) {
+                series.push(f64::from(i), *y);
             }
             let least = values.iter().copied().fold(f64::INFINITY, f64::min);
             let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -56,7 +56,7 @@ fn draw_spell(area: &Area, axis: &XAxis, spell: &Spell, ink: Ink, y: f64) -> Mar
     let width = round((to - from).max(LEAST));
     let name = spoken(spell.mark.name);
     let letters = name.chars().fold(2.0, |sum, _| sum + 1.0);
-    let decimals = usize::from(axis.divisor != 1.0 || axis.range.1 - axis.range.0 < 600.0);
+    let decimals = usize::from(axis.divisor > 1.0 || axis.range.1 - axis.range.0 < 600.0);
     html! {
         rect x=(from) y=(y) width=(width) height=(ROW) fill=(ink.css()) {
             title {

@@ -67,3 +67,11 @@ fn a_run_without_a_frame_still_has_a_page() {
     assert!(page.contains("There was no frame at all."));
     assert!(!text_of(&page).contains("NaN"));
 }
+
+#[test]
+fn hours_make_a_page_no_larger_than_minutes() {
+    let (summary, page) = page_of("hours", synthetic::hours);
+    assert_eq!(summary.frames, synthetic::HOURS_OF_FRAMES);
+    assert!(page.len() < 1_500_000, "{}", page.len());
+    assert!(page.contains("time [h]") && page.contains("along the path [m]"));
+}

@@ -49,14 +49,11 @@ fn row(width: f64, bead_path: f64, state: &'static str) -> FrameRow {
 #[test]
 fn widths_and_rejections_add_up() {
     let mut builder = SummaryBuilder::new(None, false);
-    for (frame, outcome) in
-        [Ok(40.0), Ok(42.0), Err("no_pair"), Ok(44.0), Err("no_pair"), Err("saturated")]
-            .into_iter()
-            .enumerate()
-    {
+    let outcomes = [Ok(40.0), Ok(42.0), Err("no_pair"), Ok(44.0), Err("no_pair"), Err("saturated")];
+    for (frame, outcome) in (0_u32..).zip(outcomes) {
         builder.frame(&FrameRow {
-            frame: frame as u64,
-            time_s: Some(frame as f64 * 0.5),
+            frame: u64::from(frame),
+            time_s: Some(f64::from(frame) * 0.5),
             outcome: outcome.map(|width| sample::measured(width, 0.5)),
             control: None,
         });
