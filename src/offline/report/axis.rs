@@ -60,14 +60,19 @@ impl Scale {
     }
 
     fn log_ticks(&self) -> Vec<(f64, String)> {
-        let few = self.high / self.low < 1e3;
+        let factors: &[f64] = match self.high / self.low {
+            narrow if narrow < 10.0 => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0],
+            wide if wide < 1e3 => &[1.0, 2.0, 5.0],
+            _ => &[1.0],
+        };
         let mut ticks = Vec::new();
         let mut decade = 10_f64.powf(self.low.log10().floor());
         while decade <= self.high && ticks.len() < 100 {
-            for factor in [1.0, 2.0, 5.0] {
+            for factor in factors {
                 let value = decade * factor;
-                if (few || factor < 1.5) && (self.low..=self.high).contains(&value) {
-                    ticks.push((value, format!("{value:.*}", places(value))));
+                if (self.low..=self.high).contains(&value) {
+                    let halves = usize::from(factor.fract() > 0.0);
+                    ticks.push((value, format!("{value:.*}", places(value) + halves)));
                 }
             }
             decade *= 10.0;
@@ -125,6 +130,7 @@ mod tests {
         );
         assert_eq!(labels(Scale::linear((-0.5, 0.5), page), 2), ["-0.5", "0.0", "0.5"]);
         assert_eq!(labels(Scale::log((0.3, 6.0), page), 5), ["0.5", "1", "2", "5"]);
+        assert_eq!(labels(Scale::log((0.9, 3.1), page), 5), ["1", "1.5", "2", "3"]);
     }
 
     #[test]

@@ -100,7 +100,7 @@ impl Charts {
         {
             self.setpoint.push(time, path, setpoint.get());
         }
-        if let Some(demand) = step.trace.demand_mm_per_s.filter(|_| step.command.is_some()) {
+        if let Some(demand) = step.trace.demand_mm_per_s {
             self.demand.push(time, path, MmPerS::get(demand));
         }
         self.states.push(time, state_mark(self.follower.state()));

@@ -38,7 +38,7 @@ pub const LIMIT: Ink = ink("limit", [128, 114, 20], [204, 194, 92]);
 /// Refused frames.
 pub const REJECTED: Ink = ink("rejected", [213, 94, 0], [236, 122, 38]);
 /// The robot is not printing.
-pub const IDLE: Ink = ink("idle", [190, 196, 206], [92, 98, 110]);
+pub const IDLE: Ink = ink("idle", [190, 196, 206], [140, 148, 160]);
 /// First stretch, at the start speed.
 pub const PRIMING: Ink = ink("priming", [86, 180, 233], [86, 180, 233]);
 /// The width is being corrected.
