@@ -36,6 +36,7 @@ pub fn fault(fault: &Fault) -> String {
         Fault::SpeedMismatch => "speed_mismatch".to_string(),
         Fault::RobotStopped => "robot_stopped".to_owned(),
         Fault::Robot => "robot".to_string(),
+        Fault::RobotStopped => "robot_stopped".to_string(),
     }
 }
 
