@@ -6,6 +6,7 @@ pub mod edge;
 pub mod follow;
 pub mod hash;
 pub mod laid;
+pub mod normal;
 pub mod outline;
 pub mod picture;
 pub mod render;

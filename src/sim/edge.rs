@@ -7,7 +7,7 @@
 //! G of Φ, divided by a·b. Where a or b is small the difference cancels, and a
 //! series in that one goes before it.
 
-use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+use super::normal::{cumulative, density, first_integral, second_integral};
 
 /// Blur below which an edge counts as sharp \[px\].
 const SHARP_PX: f64 = 1e-6;
@@ -62,7 +62,8 @@ fn blurred(d: f64, a: f64, b: f64) -> f64 {
         return cumulative(d) + (a2 + b2) / 24.0 * second + quartic * fourth;
     }
     // The error of the series grows as b⁶/a, that of the difference as a/b.
-    if b < SMALL.max(SMALL * libm::cbrt(a / 300.0)).min(0.5 * a) {
+    let small = if a > 300.0 { SMALL * libm::cbrt(a / 300.0) } else { SMALL };
+    if b < small.min(0.5 * a) {
         return one_way(d, a, b);
     }
     let (sum, difference) = (0.5 * (a + b), 0.5 * (a - b));
@@ -75,26 +76,11 @@ fn blurred(d: f64, a: f64, b: f64) -> f64 {
 fn one_way(d: f64, a: f64, b: f64) -> f64 {
     let (upper, lower) = (d + 0.5 * a, d - 0.5 * a);
     let (at_upper, at_lower) = (density(upper), density(lower));
-    let level = upper * cumulative(upper) + at_upper - lower * cumulative(lower) - at_lower;
+    let level = first_integral(upper) - first_integral(lower);
     let second = at_upper - at_lower;
     let fourth = (upper * upper - 1.0) * at_upper - (lower * lower - 1.0) * at_lower;
     let b2 = b * b;
     (level + b2 / 24.0 * second + b2 * b2 / 1920.0 * fourth) / a
-}
-
-/// Second antiderivative of Φ: ((u² + 1)·Φ(u) + u·φ(u))/2.
-fn second_integral(u: f64) -> f64 {
-    0.5 * ((u * u + 1.0) * cumulative(u) + u * density(u))
-}
-
-/// φ, the standard normal density.
-fn density(u: f64) -> f64 {
-    libm::exp(-0.5 * u * u) / TAU.sqrt()
-}
-
-/// Φ, the standard normal distribution.
-fn cumulative(u: f64) -> f64 {
-    0.5 * libm::erfc(-u * FRAC_1_SQRT_2)
 }
 
 #[cfg(test)]

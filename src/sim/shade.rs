@@ -15,7 +15,10 @@ struct Edge {
     /// Place along the axis of the first crossing.
     first: f64,
     cross: Vec<f64>,
+    /// Growth of the crossing along the axis, and the length of the edge, both
+    /// for one pixel along the axis.
     slope: Vec<f64>,
+    long: Vec<f64>,
 }
 
 /// A straight line across the bead, at one of its ends.
@@ -113,24 +116,25 @@ impl Edge {
                 }
             }
         }
-        let slope = (0..cross.len())
+        let slope: Vec<f64> = (0..cross.len())
             .map(|i| {
                 let (a, b) = (i.saturating_sub(1), (i + 1).min(cross.len() - 1));
                 (cross[b] - cross[a]) / whole(b - a)
             })
             .collect();
-        Self { first, cross, slope }
+        let long = slope.iter().map(|slope| f64::hypot(1.0, *slope)).collect();
+        Self { first, cross, slope, long }
     }
 
     fn index(&self, at: f64) -> usize {
-        clamp((at - self.first).round(), self.cross.len() - 1)
+        clamp(at - self.first + 0.5, self.cross.len() - 1)
     }
 
     /// First and last place across the axis that the blurred edge touches on
     /// one line.
     fn span(&self, at: f64, blur_px: f64) -> Option<(f64, f64)> {
         let i = self.index(at);
-        let reach = (REACH * blur_px + AROUND_PX) * f64::hypot(1.0, self.slope[i]);
+        let reach = (REACH * blur_px + AROUND_PX) * self.long[i];
         let (from, to) = (self.cross[i] - reach, self.cross[i] + reach);
         (from.is_finite() && to.is_finite()).then_some((from, to))
     }
@@ -140,12 +144,13 @@ impl Edge {
     fn share(&self, at: f64, place: f64, sign: f64, blur_px: f64) -> f64 {
         let here = self.index(at);
         let slope = self.slope[here];
-        let foot = (place - self.cross[here]) * slope / (1.0 + slope * slope);
+        let long = self.long[here];
+        let foot = (place - self.cross[here]) * slope / (long * long);
         let near = self.index(at + foot);
         let near = if self.slope[near].is_finite() { near } else { here };
         let (cross, slope) = (self.cross[near], self.slope[near]);
         let past = at - self.first - whole(near);
-        let long = f64::hypot(1.0, slope);
+        let long = self.long[near];
         let inside = sign * (place - cross - slope * past) / long;
         coverage(inside, [sign / long, -sign * slope / long], blur_px)
     }

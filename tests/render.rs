@@ -1,0 +1,143 @@
+//! Rendered frames: `truebead render`, the frames in `test_images`, and what
+//! the measurement makes of frames whose truth is known.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use truebead::calib::Calibration;
+use truebead::config::Cell;
+use truebead::config::cell::{CalibrationSource, Purpose};
+use truebead::io::calibration_file;
+use truebead::sim::scenario::Series;
+use truebead::vision::Measurer;
+
+const FOLDERS: [&str; 3] = ["straight", "tilted", "dark"];
+
+fn folder(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("test_images").join(name)
+}
+
+fn scenario(name: &str) -> (Cell, Calibration) {
+    let path = folder(name).join("scenario.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let cell = Cell::parse(&path, &text, Purpose::Measure).unwrap();
+    let calibration = match &cell.calibration {
+        CalibrationSource::File(path) => calibration_file::read(path).unwrap(),
+        CalibrationSource::Scale(mm_per_px) => Calibration::Scale { mm_per_px: *mm_per_px },
+    };
+    (cell, calibration)
+}
+
+#[test]
+fn the_test_images_are_made_again_pixel_by_pixel() {
+    for name in FOLDERS {
+        let (cell, calibration) = scenario(name);
+        let series = Series::new(&cell, calibration).unwrap();
+        let mut table = csv::Reader::from_path(folder(name).join("truth.csv")).unwrap();
+        let rows: Vec<Vec<f64>> = table
+            .records()
+            .map(|row| row.unwrap().iter().map(|value| value.parse().unwrap()).collect())
+            .collect();
+        assert_eq!(rows.len() as u64, series.frames());
+        for (number, row) in (0..).zip(rows) {
+            let rendered = series.render(number).unwrap();
+            let path = folder(name).join(format!("frame_{number:05}.png"));
+            let kept = image::open(&path).unwrap().into_luma8();
+            assert!(rendered.frame.to_grey8() == kept.as_raw().as_slice(), "{}", path.display());
+            let truth = rendered.truth.unwrap();
+            let made = [truth.width_mm, truth.left.x, truth.left.y, truth.right.x, truth.right.y];
+            for (made, kept) in made.iter().zip(&row[2..]) {
+                assert!((made - kept).abs() < 1e-5, "{}: {made} {kept}", path.display());
+            }
+        }
+    }
+}
+
+/// Errors of the measured widths of many frames of a scenario \[mm\], and in
+/// standard deviations as the measurement believes them.
+fn errors(name: &str, seeds: u64) -> Vec<(f64, f64)> {
+    let (mut cell, calibration) = scenario(name);
+    let surface = calibration.surface(cell.surface_height, None);
+    let mut measurer = Measurer::new(cell.gauge, None);
+    let mut errors = Vec::new();
+    for seed in 0..seeds {
+        cell.simulation.seed = seed;
+        let series = Series::new(&cell, calibration.clone()).unwrap();
+        for frame in 0..series.frames() {
+            let rendered = series.render(frame).unwrap();
+            let found = measurer.measure(&rendered.frame, &surface).unwrap();
+            let error = found.width.get() - rendered.truth.unwrap().width_mm;
+            errors.push((error, error / found.sigma.get()));
+        }
+    }
+    errors
+}
+
+#[test]
+fn measured_widths_are_those_of_the_bead() {
+    for (name, bearable_mm) in [("straight", 0.01), ("tilted", 0.03), ("dark", 0.03)] {
+        let errors = errors(name, 8);
+        let n = f64::from(u32::try_from(errors.len()).unwrap());
+        let mean = errors.iter().map(|(mm, _)| mm).sum::<f64>() / n;
+        let spread = (errors.iter().map(|(mm, _)| mm * mm).sum::<f64>() / n).sqrt();
+        let sigmas = (errors.iter().map(|(_, z)| z * z).sum::<f64>() / n).sqrt();
+        eprintln!("{name}: bias {mean:.5} mm, RMS {spread:.5} mm, {sigmas:.2} sigma");
+        assert!(spread < bearable_mm, "{name}: {spread}");
+        assert!(mean.abs() < 4.0 * spread / n.sqrt(), "{name}: bias {mean} of {spread}");
+    }
+}
+
+fn render(scenario: &Path, out: &Path, more: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_truebead"));
+    command.arg("render").arg(scenario).arg("--out").arg(out).args(more);
+    command
+}
+
+#[test]
+fn a_folder_appears_whole_with_all_that_measuring_it_needs() {
+    let scratch = tempfile::tempdir().unwrap();
+    let out = scratch.path().join("frames");
+    let scenario = folder("tilted").join("scenario.toml");
+    render(&scenario, &out, &["--frames", "2"]).assert().success();
+    let mut names: Vec<_> = fs::read_dir(&out)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    let expected = [
+        "calibration.toml",
+        "frame_00000.png",
+        "frame_00001.png",
+        "scenario.toml",
+        "times.csv",
+        "truth.csv",
+    ];
+    assert_eq!(names, expected);
+    let kept = fs::read(folder("tilted").join("frame_00001.png")).unwrap();
+    assert!(fs::read(out.join("frame_00001.png")).unwrap() == kept);
+    assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 1, "nothing else is left");
+}
+
+#[test]
+fn a_folder_with_files_and_a_bad_scenario_are_refused_in_words() {
+    let scratch = tempfile::tempdir().unwrap();
+    let used = scratch.path().join("used");
+    fs::create_dir(&used).unwrap();
+    fs::write(used.join("notes.txt"), "mine").unwrap();
+    let said = |command: &mut Command| {
+        let output = command.assert().code(2).get_output().clone();
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let message = said(&mut render(&folder("dark").join("scenario.toml"), &used, &[]));
+    assert!(message.contains("holds files already"), "{message}");
+    let bad = scratch.path().join("bad.toml");
+    let text = fs::read_to_string(folder("dark").join("scenario.toml")).unwrap();
+    fs::write(&bad, text.replace("480, 360", "320, 200")).unwrap();
+    let message = said(&mut render(&bad, &scratch.path().join("new"), &[]));
+    assert!(message.contains("(460, 350)") && message.contains("320 x 200"), "{message}");
+    fs::write(&bad, "[render]\nblurr_px = 1\n").unwrap();
+    let message = said(&mut render(&bad, &scratch.path().join("new"), &[]));
+    assert!(message.contains("line 2") && message.contains("blur_px"), "{message}");
+    assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 2, "nothing is left");
+}
