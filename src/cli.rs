@@ -8,10 +8,13 @@
 pub mod calibrate;
 pub mod cell;
 pub mod check;
+pub mod demo;
+pub mod outcome;
 pub mod process;
 pub mod render;
 pub mod replay;
 pub mod robot_sim;
+pub mod run;
 
 use std::process::ExitCode;
 
@@ -45,10 +48,13 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Demo(demo::DemoArgs),
+    Run(run::RunArgs),
     Process(process::ProcessArgs),
     Calibrate(calibrate::CalibrateArgs),
     Render(render::RenderArgs),
     RobotSim(robot_sim::RobotSimArgs),
+    Replay(replay::ReplayArgs),
     Check(check::CheckArgs),
 }
 
@@ -78,10 +84,13 @@ pub fn main() -> ExitCode {
     listen(&cli);
     let voice = Voice { quiet: cli.quiet };
     let done = match &cli.command {
+        Command::Demo(args) => demo::run(args, voice),
+        Command::Run(args) => run::run(args, voice),
         Command::Process(args) => process::run(args, voice),
         Command::Calibrate(args) => calibrate::run(args).map(|()| ExitCode::SUCCESS),
         Command::Render(args) => render::run(args).map(|()| ExitCode::SUCCESS),
         Command::RobotSim(args) => robot_sim::run(args).map(|()| ExitCode::SUCCESS),
+        Command::Replay(args) => replay::run(args),
         Command::Check(args) => check::run(args),
     };
     done.unwrap_or_else(|error| {

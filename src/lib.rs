@@ -27,6 +27,7 @@ pub mod frame;
 pub mod geometry;
 pub mod io;
 pub mod link;
+pub mod live;
 pub mod offline;
 pub mod ports;
 pub mod runner;

@@ -16,7 +16,6 @@ pub struct Runner<R, K> {
 }
 
 /// What became of an event.
-#[must_use]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Handled {
     /// The controller's answer.

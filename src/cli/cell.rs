@@ -34,6 +34,12 @@ impl LoadedCell {
         let text = fs::read_to_string(path).map_err(|error| {
             WrongArguments::new(format!("cell file {}: {error}", path.display()))
         })?;
+        Self::from_text(path, text, purpose)
+    }
+
+    /// The same, for a text that is there already; `path` is what messages
+    /// call it and where relative paths start.
+    pub fn from_text(path: &Path, text: String, purpose: Purpose) -> anyhow::Result<Self> {
         let cell = Cell::parse(path, &text, purpose)?;
         let (calibration, calibration_text) = match &cell.calibration {
             CalibrationSource::Scale(mm_per_px) => {

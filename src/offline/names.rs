@@ -34,7 +34,6 @@ pub fn fault(fault: &Fault) -> String {
     match fault {
         Fault::HeldTooLong(why) => format!("held_too_long_{}", hold(why)),
         Fault::SpeedMismatch => "speed_mismatch".to_string(),
-        Fault::RobotStopped => "robot_stopped".to_owned(),
         Fault::Robot => "robot".to_string(),
         Fault::RobotStopped => "robot_stopped".to_string(),
     }

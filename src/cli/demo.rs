@@ -1,0 +1,72 @@
+//! `truebead demo`: the whole loop on this machine, with nothing attached.
+
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Context;
+use clap::Args;
+
+use super::cell::LoadedCell;
+use super::{Voice, outcome, run};
+use crate::config::cell::Purpose;
+use crate::io::clock::RunClock;
+use crate::io::robot_sim::{RobotSim, SimOptions};
+use crate::link::{Job, RobotParams};
+use crate::time::Span;
+use crate::units::{Mm, MmPerS};
+
+/// The cell, as it is shipped.
+const CELL: &str = include_str!("../../cells/demo.toml");
+/// Where the shipped cell looks for its robot.
+const SHIPPED_ADDRESS: &str = "127.0.0.1:5653";
+
+/// Runs the whole loop on this machine with nothing attached.
+///
+/// Frames of a simulated bead are rendered and measured, a simulated robot
+/// behind a real TCP socket is controlled, and everything is recorded.
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Example:
+  truebead demo --out demo --seconds 20
+
+Open demo/report.html in a browser afterwards.")]
+pub struct DemoArgs {
+    /// Folder for the results [default: truebead-demo, with a number if that is taken]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// How long to run [s]
+    #[arg(long, value_name = "S", default_value = "20", value_parser = run::parse_seconds)]
+    seconds: f64,
+}
+
+/// Runs the command.
+pub fn run(args: &DemoArgs, voice: Voice) -> anyhow::Result<ExitCode> {
+    let out = args.out.clone().unwrap_or_else(|| outcome::free_folder("truebead-demo"));
+    let clock = RunClock::start();
+    let listener = TcpListener::bind("127.0.0.1:0").context("cannot listen on this machine")?;
+    let robot = RobotSim::spawn(listener, clock, robot_options(), Box::new(|_, _| {}))?;
+    let text = CELL.replace(SHIPPED_ADDRESS, &robot.local_addr().to_string());
+    let loaded = LoadedCell::from_text(Path::new("demo.toml"), text, Purpose::Run)?;
+    if !voice.quiet {
+        eprintln!(
+            "a simulated bead, camera and robot for {} s; the robot listens on {}",
+            args.seconds,
+            robot.local_addr()
+        );
+    }
+    let status = run::drive(loaded, &out, "Demo".into(), Some(args.seconds), clock, voice);
+    robot.stop();
+    status
+}
+
+fn robot_options() -> SimOptions {
+    let params = RobotParams {
+        min: MmPerS::constant(50.0),
+        max: MmPerS::constant(160.0),
+        hold: MmPerS::constant(80.0),
+        ..RobotParams::default()
+    };
+    let job = Job::new(1, Mm::ZERO, params.z, Span::from_millis(300));
+    SimOptions { params, job, state_period: Span::from_millis(20) }
+}

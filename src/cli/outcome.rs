@@ -1,0 +1,86 @@
+//! What a live run says at its end, and its exit status.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use super::WITH_LOSS;
+use crate::live::{Ending, LiveReport};
+use crate::offline::Summary;
+
+/// A folder name that is free: the name itself, or with the first number that
+/// is.
+pub fn free_folder(name: &str) -> PathBuf {
+    let taken = |path: &Path| path.exists();
+    let first = PathBuf::from(name);
+    if !taken(&first) {
+        return first;
+    }
+    (2u32..)
+        .map(|n| PathBuf::from(format!("{name}-{n}")))
+        .find(|path| !taken(path))
+        .unwrap_or(first)
+}
+
+/// Prints the figures of a run to standard output, and gives its status.
+pub fn tell(report: &LiveReport, out: &Path, max_rejected_share: f64) -> ExitCode {
+    figures(&report.summary);
+    println!("report     {}", out.join("report.html").display());
+    match &report.recording {
+        Ok(recording) => println!("recording  {}", recording.path.display()),
+        Err(incomplete) => eprintln!("warning: {incomplete}"),
+    }
+    status(report, max_rejected_share)
+}
+
+fn figures(summary: &Summary) {
+    println!("frames     {}, {} measured", summary.frames, summary.measured);
+    for (reason, count) in &summary.rejected {
+        println!("           {count} {reason}");
+    }
+    if let (Some(mean), Some(std)) = (summary.width_mean_mm, summary.width_std_mm) {
+        println!("width      {mean:.3} mm on average, standard deviation {std:.3} mm");
+    }
+    let Some(control) = &summary.control else { return };
+    if let Some(target) = summary.target_width_mm {
+        println!("target     {target} mm");
+    }
+    if let (Some(mean), Some(rms)) = (control.width_error_mean_mm, control.width_error_rms_mm) {
+        println!("error      {mean:.3} mm mean, {rms:.3} mm RMS, since control began");
+    }
+    if let Some(settled) = control.width_error_rms_settled_mm {
+        println!("settled    {settled:.3} mm RMS, from 500 mm after that");
+    }
+    if let (Some(p50), Some(p99)) = (control.latency_ms.p50, control.latency_ms.p99) {
+        println!("latency    {p50:.2} ms median, {p99:.2} ms p99");
+    }
+    println!("faults     {}", control.faults);
+}
+
+fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
+    let faults = report.summary.control.as_ref().map_or(0, |control| control.faults);
+    match &report.ending {
+        Ending::CameraLost(why) => {
+            eprintln!("error: the camera gives no more frames: {why}");
+            return ExitCode::FAILURE;
+        }
+        Ending::RecordingLost(why) => {
+            eprintln!("error: control ended in hold, because the run could not be recorded: {why}");
+            return ExitCode::from(WITH_LOSS);
+        }
+        _ if faults > 0 => {
+            eprintln!("error: the controller gave up {faults} times; the report says why");
+            return ExitCode::FAILURE;
+        }
+        Ending::Asked | Ending::TimeOver | Ending::LastFrame => {}
+    }
+    let share = report.summary.rejected_share();
+    if share > max_rejected_share {
+        eprintln!(
+            "warning: {:.1} % of the frames were refused, the cell bears {:.1} %",
+            share * 100.0,
+            max_rejected_share * 100.0
+        );
+        return ExitCode::from(WITH_LOSS);
+    }
+    if report.recording.is_err() { ExitCode::from(WITH_LOSS) } else { ExitCode::SUCCESS }
+}

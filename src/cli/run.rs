@@ -1,0 +1,116 @@
+//! `truebead run`: the live cell.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Context;
+use clap::Args;
+
+use super::cell::LoadedCell;
+use super::{Voice, WrongArguments, outcome};
+use crate::config::cell::Purpose;
+use crate::io::clock::RunClock;
+use crate::io::record::RecordConfig;
+use crate::io::stop::StopSignal;
+use crate::live::{self, LiveRun};
+use crate::offline::{ControlFacts, LogOptions, RunLog};
+use crate::time::Span;
+
+/// Runs the live cell: measures, controls the robot's speed, records.
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Example:
+  truebead check cell.toml
+  truebead run cell.toml --out runs/monday
+
+Ctrl-C ends the run in order: the robot is stopped, the recording finished. A
+second Ctrl-C ends it at once. Leaves recording.mcap, widths.csv, summary.json
+and report.html.")]
+pub struct RunArgs {
+    /// Cell file
+    cell: PathBuf,
+    /// Folder for the results [default: truebead-run, with a number if that is taken]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// End after this time [s]
+    #[arg(long, value_name = "S", value_parser = parse_seconds)]
+    duration: Option<f64>,
+}
+
+/// A length of time that somebody would run a cell for.
+pub fn parse_seconds(text: &str) -> Result<f64, String> {
+    text.trim()
+        .parse()
+        .ok()
+        .filter(|seconds| (0.1..=1e7).contains(seconds))
+        .ok_or_else(|| "expected a number of seconds, 0.1 or more".to_owned())
+}
+
+/// Runs the command.
+pub fn run(args: &RunArgs, voice: Voice) -> anyhow::Result<ExitCode> {
+    let loaded = LoadedCell::read(&args.cell, Purpose::Run)?;
+    let out = args.out.clone().unwrap_or_else(|| outcome::free_folder("truebead-run"));
+    let title = format!("Run of {}", args.cell.display());
+    drive(loaded, &out, title, args.duration, RunClock::start(), voice)
+}
+
+/// Runs a cell that has been loaded, into a folder, and tells how it went.
+pub fn drive(
+    loaded: LoadedCell,
+    out: &Path,
+    title: String,
+    duration_s: Option<f64>,
+    clock: RunClock,
+    voice: Voice,
+) -> anyhow::Result<ExitCode> {
+    for name in ["recording.mcap", "recording.mcap.partial"] {
+        if out.join(name).exists() {
+            let found = out.join(name).display().to_string();
+            return Err(WrongArguments::new(format!(
+                "{found} is there already and would be lost; name another folder with --out"
+            ))
+            .into());
+        }
+    }
+    let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
+    let stop = StopSignal::install().context("cannot wait for signals")?;
+    let log = RunLog::create(LogOptions {
+        folder: out.to_owned(),
+        title,
+        about: vec![
+            ("cell".into(), loaded.path.display().to_string()),
+            ("camera".into(), run.camera.source_name.clone()),
+            ("robot".into(), run.robot.address.clone()),
+            ("calibration".into(), loaded.calibration_words()),
+        ],
+        gauge: loaded.cell.gauge,
+        target: loaded.cell.target,
+        max_rejected_share: loaded.cell.recording.max_rejected_share,
+        control: Some(ControlFacts { limits: run.limits }),
+    })?;
+    let record = RecordConfig {
+        frames: loaded.cell.recording.frames,
+        epoch_ns: clock.epoch_unix_ns(),
+        cell_name: loaded.path.display().to_string(),
+        cell_text: loaded.text.clone(),
+        calibration_text: loaded.calibration_text.clone(),
+    };
+    let quiet = voice.quiet;
+    let report = live::run(LiveRun {
+        run,
+        calibration: loaded.calibration,
+        clock,
+        out: out.to_owned(),
+        record,
+        log,
+        duration: duration_s.map(Span::from_secs),
+        stop: stop.told().clone(),
+        notice: Box::new(move |line| {
+            if !quiet {
+                eprintln!("{line}");
+            }
+        }),
+        cell: loaded.cell.clone(),
+    })?;
+    Ok(outcome::tell(&report, out, loaded.cell.recording.max_rejected_share))
+}

@@ -1,0 +1,185 @@
+//! A live run: camera, measurement, control, robot link, recording and log,
+//! each in a thread of its own, around the one controller.
+//!
+//! ```text
+//! camera ─one slot, latest wins─▶ eye ─widths─▶ control ─lines─▶ robot
+//!                                  │              │ ▲
+//!                                  └─frames─┐     │ └──── link reader
+//!                                           ▼     ▼
+//!                                      recorder  scribe (widths.csv, report)
+//! ```
+//!
+//! The control thread waits for events and for the next setpoint's time, and
+//! for nothing else. Any end, wanted or not, is the same: hold, stop the
+//! robot, finish the recording, join.
+
+mod control;
+mod eye;
+mod latency;
+mod mailbox;
+mod scribe;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+
+use crossbeam_channel::{Receiver, bounded, unbounded};
+
+use crate::calib::Calibration;
+use crate::config::Cell;
+use crate::config::cell::{RunPart, Source};
+use crate::controller::{Controller, Setup};
+use crate::io::camera::open;
+use crate::io::camera::rendered::{RenderedCamera, RobotView};
+use crate::io::clock::RunClock;
+use crate::io::record::{self, Incomplete, RecordConfig, RecordReport};
+use crate::io::robot::{LinkClient, LinkConfig, LinkConfigError, LinkTiming};
+use crate::offline::{LogError, Note, RunLog, Summary};
+use crate::ports::{FrameSource, RecordError, SourceError};
+use crate::runner::Runner;
+use crate::sim::render::{RenderError, Renderer};
+use crate::time::Span;
+
+pub use control::Ending;
+use control::{LinkPort, Loop};
+use eye::Eye;
+use scribe::Scribe;
+
+/// What a live run needs.
+pub struct LiveRun {
+    /// The cell, read for a run.
+    pub cell: Cell,
+    /// Its run part.
+    pub run: RunPart,
+    /// What a pixel means in it.
+    pub calibration: Calibration,
+    /// The clock that the run counts by.
+    pub clock: RunClock,
+    /// Where the recording goes; the log has its own folder.
+    pub out: PathBuf,
+    /// What is written into the recording.
+    pub record: RecordConfig,
+    /// Takes down what happens.
+    pub log: RunLog,
+    /// How long to run; none is until something ends it.
+    pub duration: Option<Span>,
+    /// Gives a message when the run is to end.
+    pub stop: Receiver<()>,
+    /// Is told what happens, in words for the operator.
+    pub notice: Box<dyn FnMut(&str) + Send>,
+}
+
+/// How a live run went.
+pub struct LiveReport {
+    /// The figures.
+    pub summary: Summary,
+    /// Why it ended.
+    pub ending: Ending,
+    /// The recording, whole or cut short.
+    pub recording: Result<RecordReport, Box<Incomplete>>,
+}
+
+/// A live run that could not begin, or whose results could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum LiveError {
+    /// The camera gives nothing.
+    #[error(transparent)]
+    Camera(#[from] SourceError),
+    /// The bead cannot be rendered with this cell.
+    #[error("the simulated bead cannot be rendered: {0}")]
+    Render(#[from] RenderError),
+    /// The recording cannot begin.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// The robot link cannot begin.
+    #[error(transparent)]
+    Link(#[from] LinkConfigError),
+    /// Results cannot be written.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The system gives no thread.
+    #[error("no thread can be started: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
+/// Runs a cell until it is told to stop, its time is over or it fails.
+pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
+    let (ending_tell, ending_told) = bounded::<()>(0);
+    let (source, robot_view) = open_camera(&live, ending_told)?;
+    let (recorder, alarm) = record::start(&live.record, &live.out)?;
+    let (robot_events, from_robot) = unbounded();
+    let link = LinkClient::start(link_config(&live.run), live.clock, robot_events)?;
+    let robot_z = Arc::new(AtomicU64::new(f64::NAN.to_bits()));
+    let eye = Eye::start(
+        source,
+        eye::Optics {
+            cell: live.cell.clone(),
+            calibration: live.calibration.clone(),
+            robot_z: Arc::clone(&robot_z),
+        },
+        recorder.frames(),
+        live.clock,
+    )?;
+    let scribe = Scribe::start(live.log)?;
+    let controller = Controller::new(Setup::from(&live.run));
+    let mut control = Loop {
+        runner: Runner::new(controller, LinkPort::new(link), recorder),
+        clock: live.clock,
+        period: Span::from_secs(1.0 / live.run.robot.rate_hz),
+        duration: live.duration,
+        robot_z,
+        robot_view,
+        latencies: latency::Latencies::default(),
+        scribe: &scribe,
+        notice: live.notice,
+        shown: None,
+        speed: None,
+        setpoint: None,
+    };
+    let ending = control.run(&eye.seen, &from_robot, &alarm, &live.stop);
+    let (_, port, recorder) = control.runner.into_parts();
+    port.close();
+    drop(ending_tell);
+    let superseded = eye.stop();
+    let dropped = recorder.frames_dropped();
+    let recording = recorder.finish();
+    scribe.note(Note::FramesSuperseded(superseded));
+    scribe.note(Note::FramesDroppedByRecorder(dropped));
+    if let Err(incomplete) = &recording {
+        scribe.note(Note::RecordsLost(1));
+        scribe.note(Note::Remark(format!("the recording misses the end of the run: {incomplete}")));
+    }
+    Ok(LiveReport { summary: scribe.finish()?, ending, recording })
+}
+
+/// The camera of the cell; the rendered one also wants to hear of the robot.
+fn open_camera(
+    live: &LiveRun,
+    ending: Receiver<()>,
+) -> Result<(Box<dyn FrameSource>, Option<RobotView>), LiveError> {
+    let camera = &live.run.camera;
+    if camera.source != Source::Rendered {
+        return Ok((open::live(camera, live.cell.channel, live.clock, ending)?, None));
+    }
+    let simulation = &live.cell.simulation;
+    let renderer = Renderer::new(
+        live.calibration.clone(),
+        live.cell.surface_height,
+        live.cell.gauge,
+        simulation.picture,
+        simulation.seed,
+    )?;
+    let (source, view, _truth) =
+        RenderedCamera::new(renderer, simulation, camera, live.clock, ending);
+    Ok((Box::new(source), Some(view)))
+}
+
+fn link_config(run: &RunPart) -> LinkConfig {
+    LinkConfig {
+        address: run.robot.address.clone(),
+        min: run.limits.min_speed,
+        max: run.limits.max_speed,
+        valid_ms: u64::from(run.robot.valid_ms),
+        timing: LinkTiming::default(),
+    }
+}

@@ -1,0 +1,292 @@
+//! The control thread: waits for what happens and for the next setpoint's
+//! time, and lets the runner answer.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use crossbeam_channel::{Receiver, never, select};
+
+use super::eye::{Look, Seen};
+use super::latency::Latencies;
+use super::scribe::Scribe;
+use crate::control::{Command, Event, RobotMode, State, Step};
+use crate::io::camera::rendered::RobotView;
+use crate::io::clock::RunClock;
+use crate::io::record::RecorderHandle;
+use crate::io::robot::{LinkClient, RobotEvent, Written};
+use crate::offline::{ControlColumns, FrameRow, Note};
+use crate::ports::{RecordError, RobotPort};
+use crate::runner::{Handled, Runner};
+use crate::time::{Span, Stamp};
+use crate::units::MmPerS;
+use crate::vision::Reject;
+
+/// Longest wait for the robot to say that it has stopped.
+const FAREWELL: Span = Span::from_millis(600);
+
+/// Why a run ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Ending {
+    /// Somebody asked for it.
+    Asked,
+    /// Its time was over.
+    TimeOver,
+    /// The source had no more frames.
+    LastFrame,
+    /// The camera failed, and the controller has given up.
+    CameraLost(String),
+    /// What happened could not be recorded.
+    RecordingLost(String),
+}
+
+/// The link as the runner's robot, which remembers when it last wrote.
+pub struct LinkPort {
+    client: LinkClient,
+    written: Option<Written>,
+}
+
+impl LinkPort {
+    /// Over a link.
+    pub fn new(client: LinkClient) -> Self {
+        Self { client, written: None }
+    }
+
+    /// Says good-bye.
+    pub fn close(self) {
+        self.client.close();
+    }
+}
+
+impl RobotPort for LinkPort {
+    fn send(&mut self, _now: Stamp, command: Command) -> Option<u64> {
+        self.written = self
+            .client
+            .send(command)
+            .inspect_err(|reason| tracing::debug!(%reason, ?command, "not sent to the robot"))
+            .ok();
+        self.written.map(|written| written.seq)
+    }
+}
+
+/// The control thread's own.
+pub struct Loop<'a> {
+    pub runner: Runner<LinkPort, RecorderHandle>,
+    pub clock: RunClock,
+    pub period: Span,
+    pub duration: Option<Span>,
+    pub robot_z: Arc<AtomicU64>,
+    pub robot_view: Option<RobotView>,
+    pub latencies: Latencies,
+    pub scribe: &'a Scribe,
+    pub notice: Box<dyn FnMut(&str) + Send>,
+    pub shown: Option<State>,
+    pub speed: Option<MmPerS>,
+    pub setpoint: Option<MmPerS>,
+}
+
+impl Loop<'_> {
+    /// Runs until something ends it, and then ends it in order.
+    pub fn run(
+        &mut self,
+        seen: &Receiver<Seen>,
+        from_robot: &Receiver<RobotEvent>,
+        alarm: &Receiver<RecordError>,
+        stop: &Receiver<()>,
+    ) -> Ending {
+        let ending = self.until_ended(seen, from_robot, alarm, stop);
+        self.give(Event::Stop);
+        let until = self.clock.now() + FAREWELL;
+        while self.clock.now() < until {
+            let Ok(event) = from_robot.recv_timeout(duration(until - self.clock.now())) else {
+                break;
+            };
+            let stopped = matches!(&event, RobotEvent::State { state, .. }
+                if matches!(state.mode, RobotMode::Stop | RobotMode::Idle | RobotMode::Fault));
+            self.robot(event);
+            if stopped {
+                break;
+            }
+        }
+        ending
+    }
+
+    fn until_ended(
+        &mut self,
+        seen: &Receiver<Seen>,
+        from_robot: &Receiver<RobotEvent>,
+        alarm: &Receiver<RecordError>,
+        stop: &Receiver<()>,
+    ) -> Ending {
+        let mut due = self.clock.now() + self.period;
+        let over = self.duration.map(|duration| self.clock.now() + duration);
+        let (mut seen, mut alarm, none) = (seen.clone(), alarm.clone(), never());
+        let mut lost: Option<String> = None;
+        loop {
+            let now = self.clock.now();
+            if over.is_some_and(|over| now >= over) {
+                return Ending::TimeOver;
+            }
+            if now >= due {
+                self.tick(due);
+                due = next_due(due, self.period, self.clock.now());
+                if let Some(why) = &lost
+                    && matches!(self.shown, Some(State::Fault(_) | State::Idle))
+                {
+                    return Ending::CameraLost(why.clone());
+                }
+                continue;
+            }
+            let wait = over.map_or(due, |over| over.min(due)) - now;
+            select! {
+                recv(seen) -> message => match message {
+                    Ok(Seen::Frame(look)) => self.look(*look),
+                    Ok(Seen::Unreadable { seq, at, reason }) => self.unreadable(seq, at, &reason),
+                    Ok(Seen::Ended(None)) | Err(_) => return Ending::LastFrame,
+                    Ok(Seen::Ended(Some(reason))) => {
+                        (self.notice)(&format!("camera lost: {reason}"));
+                        self.give(Event::CameraLost { reason: reason.clone() });
+                        lost = Some(reason);
+                        seen = none.clone();
+                    }
+                },
+                recv(from_robot) -> message => if let Ok(event) = message { self.robot(event) },
+                recv(alarm) -> message => {
+                    if let Ok(error) = message {
+                        self.runner.lose_recording(self.clock.now(), error.clone());
+                        return Ending::RecordingLost(error.0);
+                    }
+                    alarm = never();
+                }
+                recv(stop) -> _ => return Ending::Asked,
+                default(duration(wait)) => {}
+            }
+            if let Some(error) = self.runner.failure() {
+                return Ending::RecordingLost(error.0.clone());
+            }
+        }
+    }
+
+    /// Hands an event to the runner and its answer to the log.
+    fn give(&mut self, event: Event) -> Handled {
+        let now = self.clock.now();
+        let handled = self.runner.handle(now, &event);
+        if let (Some(_), Some(Command::Speed(speed))) = (handled.sent, handled.step.command) {
+            self.setpoint = Some(speed);
+            self.scribe.note(Note::SetpointSent);
+        }
+        self.show(now, &handled.step);
+        self.scribe.step(now, event, handled.step.clone());
+        handled
+    }
+
+    /// Tells the operator of a new state.
+    fn show(&mut self, now: Stamp, step: &Step) {
+        if self.shown.as_ref() == Some(&step.state) {
+            return;
+        }
+        let words = match &step.state {
+            State::Holding(why) => format!("holding: {}", crate::offline::names::hold(why)),
+            State::Fault(why) => format!("fault: {}", crate::offline::names::fault(why)),
+            state => state.name().to_owned(),
+        };
+        (self.notice)(&format!("{:8.2} s  {}", now.secs(), words.replace('_', " ")));
+        self.shown = Some(step.state.clone());
+    }
+
+    fn tick(&mut self, due: Stamp) {
+        let handled = self.give(Event::Tick);
+        let is_speed = matches!(handled.step.command, Some(Command::Speed(_)));
+        let written = self.runner.robot_mut().written;
+        match (handled.sent, written) {
+            (Some(_), Some(written)) if is_speed => {
+                for latency in self.latencies.sent(due, written.at) {
+                    self.scribe.latency(latency);
+                }
+            }
+            _ => self.latencies.forget(),
+        }
+    }
+
+    fn look(&mut self, look: Look) {
+        let Look { frame, had_at, outcome, edges } = look;
+        let (seq, captured_at) = (frame.seq, frame.captured_at);
+        let event = match &outcome {
+            Ok(measured) => Event::Measured {
+                frame: seq,
+                captured_at,
+                width_mm: measured.width,
+                sigma_mm: measured.sigma,
+            },
+            Err(reject) => {
+                Event::Rejected { frame: seq, captured_at, reason: reject.status().to_owned() }
+            }
+        };
+        let step = self.give(event).step;
+        if step.trace.demand_mm_per_s.is_some() {
+            self.latencies.used(had_at, self.clock.now());
+        }
+        let row = FrameRow {
+            frame: seq,
+            time_s: Some(captured_at.secs()),
+            outcome: outcome.map_err(|reject| reject.status()),
+            control: Some(self.columns(&step)),
+        };
+        self.scribe.frame(row, Some((frame, edges.0, edges.1)));
+    }
+
+    fn unreadable(&mut self, seq: u64, at: Stamp, reason: &str) {
+        tracing::warn!("frame {seq} is unreadable: {reason}");
+        let status = Reject::Unreadable.status();
+        let event = Event::Rejected { frame: seq, captured_at: at, reason: status.to_owned() };
+        let step = self.give(event).step;
+        let control = Some(self.columns(&step));
+        let row = FrameRow { frame: seq, time_s: Some(at.secs()), outcome: Err(status), control };
+        self.scribe.frame(row, None);
+    }
+
+    fn columns(&self, step: &Step) -> ControlColumns {
+        ControlColumns {
+            bead_path: step.trace.bead_path_mm,
+            nozzle_path: step.trace.nozzle_path_mm,
+            speed: self.speed,
+            setpoint: self.setpoint,
+            state: step.state.name(),
+            limit: step.trace.limit,
+        }
+    }
+
+    fn robot(&mut self, event: RobotEvent) {
+        match &event {
+            RobotEvent::State { at, state } => {
+                self.robot_z.store(state.z_mm.get().to_bits(), Ordering::Relaxed);
+                self.speed = Some(state.speed_mm_per_s);
+                if let Some(view) = &self.robot_view {
+                    view.observe(*at, state);
+                }
+            }
+            RobotEvent::Up { robot, .. } => {
+                (self.notice)(&format!("robot `{}` is connected", robot.name));
+            }
+            RobotEvent::Down { reason, .. } => (self.notice)(&format!("robot: {reason}")),
+            RobotEvent::Refused { seq, code, text, .. } => {
+                (self.notice)(&format!("robot refused line {seq}: {} {text}", code.word()));
+            }
+        }
+        let (_, event) = event.into_event();
+        self.give(event);
+    }
+}
+
+fn duration(span: Span) -> Duration {
+    Duration::from_nanos(u64::try_from(span.ns()).unwrap_or(0))
+}
+
+/// The next time on the fixed grid; what was overslept is left out.
+fn next_due(due: Stamp, period: Span, now: Stamp) -> Stamp {
+    let mut next = due + period;
+    while next <= now {
+        next = next + period;
+    }
+    next
+}

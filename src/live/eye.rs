@@ -1,0 +1,165 @@
+//! Camera and measurement: one thread takes frames, another measures the
+//! newest of them.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::{Builder, JoinHandle};
+
+use crossbeam_channel::{Receiver, Sender, unbounded};
+
+use super::mailbox::Mailbox;
+use crate::calib::Calibration;
+use crate::config::Cell;
+use crate::config::cell::Mount;
+use crate::frame::Frame;
+use crate::geometry::ImagePoint;
+use crate::io::clock::RunClock;
+use crate::io::record::FrameTap;
+use crate::ports::{FrameSource, Grab};
+use crate::time::Stamp;
+use crate::units::Mm;
+use crate::vision::{Measurer, Reject, WidthMeasurement};
+
+/// What the measurement needs to know of the cell.
+pub struct Optics {
+    /// The cell.
+    pub cell: Cell,
+    /// What a pixel means in it.
+    pub calibration: Calibration,
+    /// The robot's newest z \[mm\], as bits; NaN where it has told none.
+    pub robot_z: Arc<AtomicU64>,
+}
+
+/// What the eye tells control.
+#[derive(Debug)]
+pub enum Seen {
+    /// A frame was looked at.
+    Frame(Box<Look>),
+    /// There was a frame, but it cannot be read.
+    Unreadable {
+        /// Its number.
+        seq: u64,
+        /// When that was known.
+        at: Stamp,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// No more frames: the orderly end, or why the camera failed.
+    Ended(Option<String>),
+}
+
+/// A frame that was looked at.
+#[derive(Debug)]
+pub struct Look {
+    /// The frame.
+    pub frame: Arc<Frame>,
+    /// When the program had it.
+    pub had_at: Stamp,
+    /// The width, or why there is none.
+    pub outcome: Result<WidthMeasurement, Reject>,
+    /// The edges behind the width.
+    pub edges: (Vec<ImagePoint>, Vec<ImagePoint>),
+}
+
+enum Taken {
+    Frame(Frame, Stamp),
+    Unreadable { seq: u64, at: Stamp, reason: String },
+}
+
+/// The running threads.
+pub struct Eye {
+    /// What they see.
+    pub seen: Receiver<Seen>,
+    mailbox: Arc<Mailbox<Taken>>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Eye {
+    /// Starts to look.
+    pub fn start(
+        source: Box<dyn FrameSource>,
+        optics: Optics,
+        tap: FrameTap,
+        clock: RunClock,
+    ) -> std::io::Result<Self> {
+        let (tell, seen) = unbounded();
+        let mailbox = Arc::new(Mailbox::default());
+        let (filling, told) = (Arc::clone(&mailbox), tell.clone());
+        let camera = Builder::new()
+            .name("camera".to_owned())
+            .spawn(move || take_frames(source, &filling, &told, clock))?;
+        let taking = Arc::clone(&mailbox);
+        let measure = Builder::new()
+            .name("measure".to_owned())
+            .spawn(move || measure_frames(&taking, &optics, &tap, &tell))?;
+        Ok(Self { seen, mailbox, threads: vec![camera, measure] })
+    }
+
+    /// Ends the threads, whose source must have been told to end; returns how
+    /// many frames were never looked at.
+    pub fn stop(self) -> u64 {
+        self.mailbox.close();
+        for thread in self.threads {
+            if thread.join().is_err() {
+                tracing::error!("a thread of the camera had failed");
+            }
+        }
+        self.mailbox.superseded()
+    }
+}
+
+fn take_frames(
+    mut source: Box<dyn FrameSource>,
+    mailbox: &Mailbox<Taken>,
+    tell: &Sender<Seen>,
+    clock: RunClock,
+) {
+    let why = loop {
+        let taken = match source.next_frame() {
+            Ok(Some(Grab::Frame { frame, .. })) => Taken::Frame(frame, clock.now()),
+            Ok(Some(Grab::Unreadable { seq, reason, .. })) => {
+                Taken::Unreadable { seq, at: clock.now(), reason }
+            }
+            Ok(None) => break None,
+            Err(error) => break Some(error.to_string()),
+        };
+        if !mailbox.put(taken) {
+            break None;
+        }
+    };
+    mailbox.close();
+    // Nobody listens any more when the run has ended first.
+    let _ = tell.send(Seen::Ended(why));
+}
+
+fn measure_frames(mailbox: &Mailbox<Taken>, optics: &Optics, tap: &FrameTap, tell: &Sender<Seen>) {
+    let mut measurer = Measurer::new(optics.cell.gauge, optics.cell.white);
+    while let Some(taken) = mailbox.take() {
+        let seen = match taken {
+            Taken::Frame(frame, had_at) => {
+                let outcome = measurer.measure(&frame, &optics.surface());
+                let edges = measurer.edges();
+                let frame = Arc::new(frame);
+                let edges = (edges.left.to_vec(), edges.right.to_vec());
+                let look = Look { frame: Arc::clone(&frame), had_at, outcome, edges };
+                if tell.send(Seen::Frame(Box::new(look))).is_err() {
+                    return;
+                }
+                tap.frame(frame);
+                continue;
+            }
+            Taken::Unreadable { seq, at, reason } => Seen::Unreadable { seq, at, reason },
+        };
+        if tell.send(seen).is_err() {
+            return;
+        }
+    }
+}
+
+impl Optics {
+    fn surface(&self) -> crate::calib::SurfaceMap {
+        let z = Mm::new(f64::from_bits(self.robot_z.load(Ordering::Relaxed))).ok();
+        let z = z.filter(|_| self.cell.mount != Some(Mount::Fixed));
+        self.calibration.surface(self.cell.surface_height, z)
+    }
+}

@@ -1,0 +1,92 @@
+//! Writes the log of a live run in a thread of its own, so that neither the
+//! disk nor the pictures for the report hold control up.
+
+use std::sync::Arc;
+use std::thread::{Builder, JoinHandle};
+
+use crossbeam_channel::{Receiver, Sender, unbounded};
+
+use super::latency::Latency;
+use crate::control::{Event, Step};
+use crate::frame::Frame;
+use crate::geometry::ImagePoint;
+use crate::offline::{FrameRow, LogError, Note, RunLog, Summary};
+use crate::time::Stamp;
+use crate::vision::Edges;
+
+/// Pictures that may wait for the log; beyond, rows go without theirs.
+const WAITING_PICTURES: usize = 16;
+
+enum Fact {
+    Frame { row: FrameRow, picture: Option<(Arc<Frame>, Vec<ImagePoint>, Vec<ImagePoint>)> },
+    Step { now: Stamp, event: Event, step: Step },
+    Latency(Latency),
+    Note(Note),
+}
+
+/// The thread that writes the log.
+pub struct Scribe {
+    facts: Sender<Fact>,
+    thread: JoinHandle<Result<Summary, LogError>>,
+}
+
+impl Scribe {
+    /// Starts to write.
+    pub fn start(log: RunLog) -> std::io::Result<Self> {
+        let (facts, told) = unbounded();
+        let thread = Builder::new().name("log".to_owned()).spawn(move || write_all(log, &told))?;
+        Ok(Self { facts, thread })
+    }
+
+    /// A frame that was looked at, with its picture and edges.
+    pub fn frame(
+        &self,
+        row: FrameRow,
+        picture: Option<(Arc<Frame>, Vec<ImagePoint>, Vec<ImagePoint>)>,
+    ) {
+        let picture = picture.filter(|_| self.facts.len() < WAITING_PICTURES);
+        self.tell(Fact::Frame { row, picture });
+    }
+
+    /// An event and its answer.
+    pub fn step(&self, now: Stamp, event: Event, step: Step) {
+        self.tell(Fact::Step { now, event, step });
+    }
+
+    /// A frame's way to a setpoint.
+    pub fn latency(&self, latency: Latency) {
+        self.tell(Fact::Latency(latency));
+    }
+
+    /// Another fact.
+    pub fn note(&self, note: Note) {
+        self.tell(Fact::Note(note));
+    }
+
+    /// A scribe that has failed keeps its error for the end.
+    fn tell(&self, fact: Fact) {
+        let _ = self.facts.send(fact);
+    }
+
+    /// Finishes the files.
+    pub fn finish(self) -> Result<Summary, LogError> {
+        drop(self.facts);
+        self.thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    }
+}
+
+fn write_all(mut log: RunLog, told: &Receiver<Fact>) -> Result<Summary, LogError> {
+    for fact in told {
+        match fact {
+            Fact::Frame { row, picture: Some((frame, left, right)) } => {
+                let edges = Edges { left: &left, right: &right };
+                log.frame(&row, Some(&frame), Some(edges))?;
+            }
+            Fact::Frame { row, picture: None } => log.frame(&row, None, None)?,
+            Fact::Step { now, event, step } => log.step(now, &event, &step),
+            Fact::Latency(latency) => log.latency(latency.latency_ms, latency.send_wait_ms),
+            Fact::Note(note) => log.note(&note),
+        }
+    }
+    log.finish()
+}
