@@ -157,11 +157,11 @@ impl Controller {
     fn measured(&mut self, captured_at: Stamp, width: Mm, trace: &mut Trace) {
         let error = width - self.setup.control.target;
         trace.error_mm = Some(error);
-        let Some(bead_path) = self.place(captured_at, trace) else { return };
+        self.place(captured_at, trace);
         let primed = trace
             .nozzle_path_mm
             .is_some_and(|path| path - self.bead_start >= self.setup.start_length);
-        let own_bead = bead_path >= self.bead_start;
+        let own_bead = trace.bead_expected;
         match &self.phase {
             Phase::Tracking { .. } => self.track(captured_at, error, trace),
             Phase::Priming | Phase::Holding { why: Hold::NoWidth, .. }
@@ -175,11 +175,12 @@ impl Controller {
 
     /// Where the nozzle was when a frame was captured, and where the bead in
     /// it had been laid.
-    fn place(&self, captured_at: Stamp, trace: &mut Trace) -> Option<Mm> {
+    fn place(&self, captured_at: Stamp, trace: &mut Trace) {
         trace.captured_at = Some(captured_at);
         trace.nozzle_path_mm = self.transport.path_at(captured_at);
         trace.bead_path_mm = trace.nozzle_path_mm.map(|path| path - self.setup.camera_offset);
-        trace.bead_path_mm
+        trace.bead_expected = self.phase != Phase::Idle
+            && trace.bead_path_mm.is_some_and(|path| path >= self.bead_start);
     }
 
     fn start_tracking(&mut self, captured_at: Stamp, error: Mm, trace: &mut Trace) {

@@ -117,6 +117,10 @@ pub struct Trace {
     /// Distance of the nozzle along the path when the frame was captured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nozzle_path_mm: Option<Mm>,
+    /// Whether bead of this run lies under the camera: false before a bead has
+    /// come so far, and while the robot is idle.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub bead_expected: bool,
     /// Measured less wanted width.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error_mm: Option<Mm>,

@@ -248,6 +248,7 @@ impl Loop<'_> {
     fn columns(&self, step: &Step) -> ControlColumns {
         ControlColumns {
             bead_path: step.trace.bead_path_mm,
+            bead_expected: step.trace.bead_expected,
             nozzle_path: step.trace.nozzle_path_mm,
             speed: self.speed,
             setpoint: self.setpoint,

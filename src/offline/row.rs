@@ -24,6 +24,9 @@ pub struct FrameRow {
 pub struct ControlColumns {
     /// Where along the path the bead in the gauge had been laid.
     pub bead_path: Option<Mm>,
+    /// Whether bead of this run was under the camera; a frame without it is no
+    /// loss when it is refused.
+    pub bead_expected: bool,
     /// Distance of the nozzle along the path when the frame was captured.
     pub nozzle_path: Option<Mm>,
     /// Speed that the robot reported.

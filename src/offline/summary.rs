@@ -28,6 +28,10 @@ pub struct Summary {
     pub measured: u64,
     /// The others: status in `widths.csv` and how many.
     pub rejected: BTreeMap<&'static str, u64>,
+    /// Refused frames of a run in which no bead of it was under the camera yet,
+    /// or any more; they are no loss.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rejected_without_bead: Option<u64>,
     /// Mean of the measured widths.
     pub width_mean_mm: Option<f64>,
     /// Their sample standard deviation.
@@ -65,12 +69,16 @@ pub struct HintSummary {
 }
 
 impl Summary {
-    /// Share of the frames that were refused or unreadable; 0 of none.
+    /// Share of the frames that were refused or unreadable, of those that could
+    /// show bead; 0 of none.
     pub fn rejected_share(&self) -> f64 {
-        match self.frames {
-            0 => 0.0,
-            frames => as_f64(frames - self.measured.min(frames)) / as_f64(frames),
-        }
+        let frames = self.frames_with_bead();
+        if frames == 0 { 0.0 } else { as_f64(frames - self.measured.min(frames)) / as_f64(frames) }
+    }
+
+    /// Frames less those that were refused where no bead of the run could be.
+    pub fn frames_with_bead(&self) -> u64 {
+        self.frames.saturating_sub(self.rejected_without_bead.unwrap_or(0))
     }
 
     /// Writes `summary.json` into a folder.
@@ -104,6 +112,7 @@ pub struct SummaryBuilder {
     target: Option<Mm>,
     frames: u64,
     rejected: BTreeMap<&'static str, u64>,
+    rejected_without_bead: u64,
     width: Moments,
     sigma: Moments,
     roughness: Moments,
@@ -124,6 +133,7 @@ impl SummaryBuilder {
             target,
             frames: 0,
             rejected: BTreeMap::new(),
+            rejected_without_bead: 0,
             width: Moments::default(),
             sigma: Moments::default(),
             roughness: Moments::default(),
@@ -143,7 +153,12 @@ impl SummaryBuilder {
         self.frames += 1;
         self.moment(row.time_s);
         match &row.outcome {
-            Err(status) => *self.rejected.entry(status).or_default() += 1,
+            Err(status) => {
+                *self.rejected.entry(status).or_default() += 1;
+                if row.control.is_some_and(|control| !control.bead_expected) {
+                    self.rejected_without_bead += 1;
+                }
+            }
             Ok(measured) => {
                 self.width.add(measured.width.get());
                 self.sigma.add(measured.sigma.get());
@@ -195,6 +210,7 @@ impl SummaryBuilder {
             frames: self.frames,
             measured,
             rejected: self.rejected.clone(),
+            rejected_without_bead: self.control.is_some().then_some(self.rejected_without_bead),
             width_mean_mm: self.width.mean(),
             width_std_mm: self.width.std(),
             sigma_mean_mm: self.sigma.mean(),

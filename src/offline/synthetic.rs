@@ -184,6 +184,7 @@ pub fn run(folder: &Path) -> Summary {
         let width = width_at(time) + 0.06 * chance(frame + 3);
         let outcome = refused_at(frame, time).map_or(Ok(measured(frame, width)), Err);
         let control = ControlColumns {
+            bead_expected: true,
             bead_path: Mm::new(path - MM_BEHIND).ok().filter(|path| *path >= Mm::ZERO),
             nozzle_path: Mm::new(path).ok(),
             speed: MmPerS::new(speed_at(time)).ok(),
@@ -237,6 +238,7 @@ pub fn hours(folder: &Path) -> Summary {
         let lost = frame % 997 == 0;
         let outcome = if lost { Err("no_pair") } else { Ok(measured(frame, width)) };
         let control = ControlColumns {
+            bead_expected: true,
             bead_path: Mm::new(path - MM_BEHIND).ok(),
             nozzle_path: Mm::new(path).ok(),
             speed: MmPerS::new(80.0).ok(),

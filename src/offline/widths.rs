@@ -109,7 +109,7 @@ impl WidthsWriter {
             }
         }
         if self.with_control {
-            for field in control_fields(row.control.as_ref()) {
+            for field in control_fields(row.control.as_ref().filter(|_| row.outcome.is_ok())) {
                 self.csv.write_field(field)?;
             }
         }

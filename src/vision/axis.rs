@@ -32,26 +32,26 @@ pub struct Caliper {
     pub right: Located,
 }
 
-/// Width of the bead from its calipers. `expected` is the number of caliper
-/// lines that there could be.
+/// Width of the bead from its calipers, of which there could be `expected`.
+/// `memory` is scratch.
 pub fn width(
-    calipers: &[Caliper],
-    expected: usize,
+    (calipers, expected): (&[Caliper], usize),
     view: &View,
     surface: &SurfaceMap,
     gauge: &Gauge,
     hints: Hints,
+    memory: &mut Vec<f64>,
 ) -> Result<WidthMeasurement, Reject> {
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     let (centre, reach) = ((view.along - 1) as f64 / 2.0, view.along as f64 / 2.0);
     let place = |along: f64| (along - centre) / reach;
     let slant_rad = slant(calipers, &place, reach)?;
-    let axis = Midline::fit(calipers, &place, view, surface)?;
-    let mut sums = Sums::default();
+    let axis = Midline::fit(calipers, &place, view, surface, memory)?;
+    let mut sums = Sums { tilt_variance: axis.tilt_variance, ..Sums::default() };
     for caliper in calipers {
         let normal = axis.normal(place(caliper.along)).ok_or(Reject::OffSurface)?;
         let (left, right) = points(caliper, view, surface)?;
-        sums.add((right - left).dot(&normal).abs(), caliper);
+        sums.add(right - left, normal, caliper);
     }
     let middle_normal = axis.normal(0.0).ok_or(Reject::OffSurface)?;
     let left = edge_at_middle(calipers, &place, |caliper| caliper.left.at);
@@ -89,6 +89,10 @@ struct Sums {
     squares: f64,
     variance_left: f64,
     variance_right: f64,
+    /// Mean of the part of the caliper lines that runs along the bead.
+    oblique: f64,
+    /// Variance of the axis' direction \[rad²\].
+    tilt_variance: f64,
 }
 
 struct Averaged {
@@ -100,8 +104,10 @@ struct Averaged {
 
 impl Sums {
     /// Welford's update, so that a small scatter of wide beads is not lost.
-    fn add(&mut self, width: f64, caliper: &Caliper) {
+    fn add(&mut self, across: Vector2<f64>, normal: Vector2<f64>, caliper: &Caliper) {
+        let width = across.dot(&normal).abs();
         self.n += 1.0;
+        self.oblique += (across.perp(&normal) - self.oblique) / self.n;
         let off = width - self.mean;
         self.mean += off / self.n;
         self.squares += off * (width - self.mean);
@@ -119,7 +125,10 @@ impl Sums {
         // The lines that are missing hide bead that counts; its waviness is
         // an error then.
         let hidden = roughness * roughness * (1.0 - used_share).max(0.0) / self.n;
-        let sigma = (noise / (self.n * self.n) + hidden).sqrt();
+        // Where the caliper lines run obliquely to the bead, an axis that is
+        // off in direction takes them for longer or shorter.
+        let tilt = self.oblique * self.oblique * self.tilt_variance;
+        let sigma = (noise / (self.n * self.n) + hidden + tilt).sqrt();
         Averaged { mean: self.mean, sigma, roughness, used_share }
     }
 }
@@ -192,7 +201,12 @@ fn edge_at_middle(
 
 /// The bead's middle line on the surface, as a parabola over the place along
 /// the gauge, so that a curved bead has a local axis.
-struct Midline(Parabola);
+struct Midline {
+    line: Parabola,
+    /// Variance of the direction in the middle \[rad²\], from how far the
+    /// middles lie from the line and over how many calipers that is correlated.
+    tilt_variance: f64,
+}
 
 impl Midline {
     fn fit(
@@ -200,30 +214,72 @@ impl Midline {
         place: &impl Fn(f64) -> f64,
         view: &View,
         surface: &SurfaceMap,
+        memory: &mut Vec<f64>,
     ) -> Result<Self, Reject> {
+        let middle = |caliper: &Caliper| -> Result<(f64, Vector2<f64>), Reject> {
+            let (left, right) = points(caliper, view, surface)?;
+            Ok((place(caliper.along), nalgebra::center(&left, &right).coords))
+        };
         let mut fit = ParabolaFit::default();
         for caliper in calipers {
-            let (left, right) = points(caliper, view, surface)?;
-            fit.add(place(caliper.along), nalgebra::center(&left, &right).coords);
+            let (place, at) = middle(caliper)?;
+            fit.add(place, at);
         }
-        fit.solve().map(Self).ok_or(Reject::NoPair { got: 0.0, need: 0.0 })
+        let failed = Reject::NoPair { got: 0.0, need: 0.0 };
+        let mut axis = Self { line: fit.solve().ok_or(failed)?, tilt_variance: 0.0 };
+        memory.clear();
+        for caliper in calipers {
+            let (place, at) = middle(caliper)?;
+            let normal = axis.normal(place).ok_or(Reject::OffSurface)?;
+            memory.push((at - axis.line.at(place)).dot(&normal));
+        }
+        let per_place = fit.slope_variance().ok_or(failed)?;
+        axis.tilt_variance =
+            per_place * correlated_variance(memory) / axis.line.linear.norm_squared();
+        Ok(axis)
     }
 
     /// Unit normal of the line at a place; `None` where the line has no
     /// direction.
     fn normal(&self, place: f64) -> Option<Vector2<f64>> {
-        let along = self.0.linear + self.0.bend * (2.0 * place);
+        let along = self.line.linear + self.line.bend * (2.0 * place);
         Vector2::new(-along.y, along.x).try_normalize(1e-12)
     }
 }
 
+/// Variance of values about zero, times the number of neighbours over which
+/// they are correlated (the integrated autocorrelation up to its first zero),
+/// so that it may be used as if they were independent.
+fn correlated_variance(values: &[f64]) -> f64 {
+    let square: f64 = values.iter().map(|value| value * value).sum();
+    if square <= 0.0 {
+        return 0.0;
+    }
+    let mut time = 1.0;
+    for lag in 1..values.len() / 2 {
+        let product: f64 = values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum();
+        if product <= 0.0 {
+            break;
+        }
+        time += 2.0 * product / square;
+    }
+    #[expect(clippy::cast_precision_loss, reason = "there are few calipers")]
+    let freedom = (values.len() as f64 - 3.0).max(1.0);
+    square / freedom * time
+}
+
 /// p₀ + p₁·t + p₂·t² in two coordinates.
 struct Parabola {
+    start: Vector2<f64>,
     linear: Vector2<f64>,
     bend: Vector2<f64>,
 }
 
 impl Parabola {
+    fn at(&self, place: f64) -> Vector2<f64> {
+        self.start + (self.linear + self.bend * place) * place
+    }
+
     fn fit(samples: impl Iterator<Item = (f64, Vector2<f64>)>) -> Option<Self> {
         let mut fit = ParabolaFit::default();
         for (place, value) in samples {
@@ -249,9 +305,15 @@ impl ParabolaFit {
         self.y += row * value.y;
     }
 
+    /// Variance of the slope in the middle for values of variance 1.
+    fn slope_variance(&self) -> Option<f64> {
+        Some(self.matrix.cholesky()?.inverse().m22)
+    }
+
     fn solve(&self) -> Option<Parabola> {
         let solver = self.matrix.cholesky()?;
         let (x, y) = (solver.solve(&self.x), solver.solve(&self.y));
-        Some(Parabola { linear: Vector2::new(x.y, y.y), bend: Vector2::new(x.z, y.z) })
+        let start = Vector2::new(x.x, y.x);
+        Some(Parabola { start, linear: Vector2::new(x.y, y.y), bend: Vector2::new(x.z, y.z) })
     }
 }

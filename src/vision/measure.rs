@@ -265,7 +265,8 @@ impl Measurer {
                 self.right_px.push(view.to_image(right.at, v));
             }
         }
-        axis::width(&self.calipers, self.bands.count(), view, surface, &self.gauge, hints)
+        let calipers = (self.calipers.as_slice(), self.bands.count());
+        axis::width(calipers, view, surface, &self.gauge, hints, &mut self.scatter)
     }
 }
 

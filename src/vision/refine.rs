@@ -235,7 +235,10 @@ impl Refiner {
             let start = Edge { at: alone.edge.at, ground, height, shading };
             self.edges[band] = window.fit(table, start, Some(&prior)).map(|fit| Located {
                 at: fit.edge.at,
-                variance: fit.variance[0],
+                // Levels that neighbours share are wrong for all of them
+                // together, so that the mean of many edges is no surer than
+                // if each had found its own.
+                variance: alone.variance[0] * noise,
                 height: fit.edge.height,
             });
         }
@@ -339,7 +342,7 @@ fn half_window(blur_px: f64, width_px: f64) -> usize {
         clippy::cast_sign_loss,
         reason = "a blur is a few pixels"
     )]
-    let wanted = (2.6 * blur_px + 1.5).ceil() as usize;
+    let wanted = (4.0 * blur_px + 2.0).ceil() as usize;
     wanted.clamp(MIN_HALF, widest_half(width_px))
 }
 

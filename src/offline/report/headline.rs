@@ -85,16 +85,17 @@ fn held_sentence(control: &ControlSummary, target: f64) -> String {
 
 fn share_sentence(summary: &Summary, max_rejected_share: f64) -> String {
     let share = (1.0 - summary.rejected_share()) * 100.0;
-    let frames = summary.frames;
+    let frames = summary.frames_with_bead();
+    let of_bead = if frames == summary.frames { "" } else { " that could show bead" };
     if summary.frames == 0 {
         "There was no frame at all.".to_string()
     } else if summary.rejected_share() > max_rejected_share {
         format!(
-            "Only {share:.1} % of {frames} frames were measured; the cell asks for {:.0} %.",
+            "Only {share:.1} % of {frames} frames{of_bead} were measured; the cell asks for {:.0} %.",
             (1.0 - max_rejected_share) * 100.0
         )
     } else {
-        format!("{share:.1} % of {frames} frames were measured.")
+        format!("{share:.1} % of {frames} frames{of_bead} were measured.")
     }
 }
 

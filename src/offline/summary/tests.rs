@@ -36,6 +36,7 @@ fn row(width: f64, bead_path: f64, state: &'static str) -> FrameRow {
         time_s: None,
         outcome: Ok(sample::measured(width, 0.5)),
         control: Some(ControlColumns {
+            bead_expected: true,
             bead_path: Some(Mm::new(bead_path).unwrap()),
             nozzle_path: None,
             speed: None,

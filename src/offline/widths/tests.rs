@@ -51,6 +51,7 @@ fn a_rejected_row_keeps_frame_time_and_status() {
 #[test]
 fn a_run_says_where_the_robot_was_and_what_the_controller_did() {
     let control = ControlColumns {
+        bead_expected: true,
         bead_path: Some(Mm::constant(10.0)),
         nozzle_path: Some(Mm::constant(100.0)),
         speed: Some(MmPerS::constant(80.5)),
@@ -64,10 +65,7 @@ fn a_run_says_where_the_robot_was_and_what_the_controller_did() {
     assert!(lines[0].ends_with(
         ",used_share,bead_path_mm,nozzle_path_mm,speed_mm_per_s,setpoint_mm_per_s,state,limit"
     ));
-    assert_eq!(
-        lines[1],
-        "0,0.000000000,no_pair,,,,,,,,,,,,,,10.000000,100.000000,80.500000,,tracking,min_speed"
-    );
+    assert_eq!(lines[1], "0,0.000000000,no_pair,,,,,,,,,,,,,,,,,,,");
 }
 
 #[test]
