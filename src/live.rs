@@ -137,10 +137,12 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         setpoint: None,
     };
     let ending = control.run(&eye.seen, &from_robot, &alarm, &live.stop);
+    drop(ending_tell);
+    let seen = eye.seen.clone();
+    let superseded = eye.stop();
+    control.take_rest(&seen);
     let (_, port, recorder) = control.runner.into_parts();
     port.close();
-    drop(ending_tell);
-    let superseded = eye.stop();
     let dropped = recorder.frames_dropped();
     let recording = recorder.finish();
     scribe.note(Note::FramesSuperseded(superseded));

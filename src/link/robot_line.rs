@@ -220,7 +220,7 @@ mod tests {
                     RobotLine::State(RobotState { t_ms, seq, mode, speed_mm_per_s, path_mm, z_mm })
                 }
             ),
-            (any::<u64>(), code, "[ -~]{0,95}").prop_map(|(seq, code, text)| RobotLine::Err {
+            (any::<u64>(), code, "[ -~]{0,90}").prop_map(|(seq, code, text)| RobotLine::Err {
                 seq,
                 code,
                 text

@@ -111,6 +111,18 @@ impl Loop<'_> {
         ending
     }
 
+    /// Takes down what was seen until the camera ended, so that every frame in
+    /// the recording has its event.
+    pub fn take_rest(&mut self, seen: &Receiver<Seen>) {
+        for seen in seen.try_iter() {
+            match seen {
+                Seen::Frame(look) => self.look(*look),
+                Seen::Unreadable { seq, at, reason } => self.unreadable(seq, at, &reason),
+                Seen::Ended(_) => {}
+            }
+        }
+    }
+
     fn until_ended(
         &mut self,
         seen: &Receiver<Seen>,
