@@ -12,7 +12,7 @@ pub struct Problem {
     pub key: String,
     /// What stands there.
     pub found: String,
-    /// What should.
+    /// What should; empty where `found` says it all.
     pub expected: String,
 }
 
@@ -23,6 +23,9 @@ impl fmt::Display for Problem {
         }
         if !self.key.is_empty() {
             write!(f, "{}: ", self.key)?;
+        }
+        if self.expected.is_empty() {
+            return f.write_str(&self.found);
         }
         write!(f, "found {}, expected {}", self.found, self.expected)
     }

@@ -27,7 +27,7 @@ impl<'a> Document<'a> {
         let document = Self { file, text, root, problems: RefCell::default(), for_run };
         for error in errors {
             let line = error.span().map(|span| document.line_of(span.start));
-            document.report(line, "", error.message().to_string(), "valid TOML");
+            document.report(line, "", format!("not TOML: {}", error.message()), "");
         }
         document
     }
@@ -47,6 +47,10 @@ impl<'a> Document<'a> {
     /// The value that was read if nothing was wrong, else everything that was.
     pub fn finish<T>(self, value: Option<T>) -> Result<T, Problems> {
         let mut list = self.problems.into_inner();
+        // What follows from a slip of syntax is no news.
+        if list.iter().any(|problem| problem.expected.is_empty()) {
+            list.retain(|problem| problem.expected.is_empty());
+        }
         list.sort_by_key(|problem| problem.line.unwrap_or(usize::MAX));
         match value {
             Some(value) if list.is_empty() => Ok(value),
