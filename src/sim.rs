@@ -1,6 +1,7 @@
 //! The simulated cell: a bead, the world around it and the pictures of it.
 
 pub mod bead;
+pub mod cell;
 pub mod disturbance;
 pub mod edge;
 pub mod follow;
@@ -11,6 +12,7 @@ pub mod outline;
 pub mod picture;
 pub mod render;
 pub mod scenario;
+pub mod score;
 pub mod shade;
 pub mod truth;
 pub mod view;

@@ -35,6 +35,11 @@ pub struct Simulation {
     pub step: Span,
     /// Bandwidth of the robot's speed loop \[Hz\].
     pub robot_bandwidth_hz: f64,
+    /// Whether camera and robot link tick at phases drawn from the seed, as
+    /// in a real cell, or both on the grid of the simulated world.
+    pub random_phase: bool,
+    /// Stretch of bead that a width is the mean of, where no frame is rendered.
+    pub gauge_length: Mm,
     /// Standard deviation of a measured width, where no frame is rendered.
     pub width_noise: Mm,
     /// How wide a bead comes out at a speed.
@@ -62,6 +67,8 @@ pub fn read(root: &Table<'_>) -> Option<Simulation> {
     let path = world.number_or("path_mm", 1.0..=1e7, 2000.0);
     let step_ms = world.number_or("step_ms", 0.1..=1000.0, 20.0);
     let bandwidth = world.number_or("robot_bandwidth_hz", 0.01..=1000.0, 10.0);
+    let random_phase = world.choice("phase", &[("random", true), ("aligned", false)]);
+    let gauge_length = world.number_or("gauge_length_mm", 0.0..=1e4, 0.0);
     let noise = world.number_or("width_noise_mm", 0.0..=100.0, 0.36);
     Some(Simulation {
         seed: seed?,
@@ -70,6 +77,8 @@ pub fn read(root: &Table<'_>) -> Option<Simulation> {
         frame_spacing: spacing.and_then(|spacing| Mm::new(spacing).ok()),
         step: Span::from_secs(step_ms? / 1e3),
         robot_bandwidth_hz: bandwidth?,
+        random_phase: random_phase?,
+        gauge_length: Mm::new(gauge_length?).ok()?,
         width_noise: Mm::new(noise?).ok()?,
         bead: model?,
         roughness: roughness?,

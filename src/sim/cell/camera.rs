@@ -1,0 +1,173 @@
+//! The camera of a simulated cell: rendered frames that are measured like any
+//! other, or the true width with noise.
+
+use nalgebra::Vector2;
+
+use crate::calib::{Calibration, SurfaceMap};
+use crate::config::Cell;
+use crate::config::cell::Mount;
+use crate::config::rendered::Level;
+use crate::control::Step;
+use crate::frame::Frame;
+use crate::geometry::ImagePoint;
+use crate::sim::hash;
+use crate::sim::laid::LaidBead;
+use crate::sim::render::{RenderError, Renderer};
+use crate::sim::truth::Truth;
+use crate::sim::view::gauge_middle;
+use crate::time::Stamp;
+use crate::units::{Mm, MmPerS};
+use crate::vision::{Axis, Edges, Hints, Measurer, Reject, WidthMeasurement};
+
+/// What the camera saw, for a witness.
+#[derive(Debug)]
+pub struct Sight<'a> {
+    /// Number of the frame, through all layers.
+    pub seq: u64,
+    /// When.
+    pub captured_at: Stamp,
+    /// The width, or the status of a frame that was refused.
+    pub outcome: Result<WidthMeasurement, &'static str>,
+    /// The frame, where one was rendered.
+    pub frame: Option<&'a Frame>,
+    /// The edges behind the width, where a frame was measured.
+    pub edges: Option<Edges<'a>>,
+    /// What a perfect measurement would have found.
+    pub truth: Option<Truth>,
+    /// Where along the bead the middle of the gauge was \[mm\].
+    pub under_mm: f64,
+    /// The controller's answer.
+    pub step: &'a Step,
+    /// Speed that the robot last reported.
+    pub speed: Option<MmPerS>,
+    /// Last setpoint.
+    pub setpoint: Option<MmPerS>,
+}
+
+/// One picture.
+pub struct Taken {
+    pub seq: u64,
+    pub outcome: Result<WidthMeasurement, &'static str>,
+    pub frame: Option<Frame>,
+    pub truth: Option<Truth>,
+}
+
+pub struct SimCamera {
+    level: Level,
+    seed: u64,
+    seq: u64,
+    gauge_length: f64,
+    noise: Mm,
+    rides: bool,
+    calibration: Calibration,
+    surface_height: Mm,
+    middle: ImagePoint,
+    across: Vector2<f64>,
+    renderer: Renderer,
+    measurer: Measurer,
+}
+
+impl SimCamera {
+    pub fn new(cell: &Cell, calibration: Calibration) -> Result<Self, RenderError> {
+        let simulation = &cell.simulation;
+        let renderer = Renderer::new(
+            calibration.clone(),
+            cell.surface_height,
+            cell.gauge,
+            simulation.picture,
+            simulation.seed,
+        )?;
+        Ok(Self {
+            level: simulation.level,
+            seed: simulation.seed,
+            seq: 0,
+            gauge_length: simulation.gauge_length.get(),
+            noise: simulation.width_noise,
+            rides: cell.mount != Some(Mount::Fixed),
+            calibration,
+            surface_height: cell.surface_height,
+            middle: gauge_middle(&cell.gauge.roi),
+            across: match cell.gauge.axis {
+                Axis::Vertical => Vector2::x(),
+                Axis::Horizontal => Vector2::y(),
+            },
+            renderer,
+            measurer: Measurer::new(cell.gauge, cell.white),
+        })
+    }
+
+    /// The edges behind the last measured frame.
+    pub fn edges(&self) -> Edges<'_> {
+        self.measurer.edges()
+    }
+
+    /// Looks at the bead with the middle of the gauge at `under_mm` along it.
+    pub fn take(&mut self, now: Stamp, under_mm: f64, z: Mm, bead: &LaidBead) -> Taken {
+        let seq = self.seq;
+        self.seq += 1;
+        let z = self.rides.then_some(z);
+        let surface = self.calibration.surface(self.surface_height, z);
+        match self.level {
+            Level::Widths => {
+                let outcome = self.width(seq, under_mm, bead, &surface);
+                Taken { seq, outcome, frame: None, truth: None }
+            }
+            Level::Frames => {
+                let edges = |along: f64| bead.edges_at(under_mm + along);
+                match self.renderer.render(seq, now, z, &edges) {
+                    Err(_) => {
+                        let outcome = Err(Reject::OffSurface.status());
+                        Taken { seq, outcome, frame: None, truth: None }
+                    }
+                    Ok(rendered) => {
+                        let found = self.measurer.measure(&rendered.frame, &surface);
+                        let outcome = found.map_err(|reject| reject.status());
+                        let (frame, truth) = (Some(rendered.frame), rendered.truth);
+                        Taken { seq, outcome, frame, truth }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The true width over the gauge, with noise.
+    fn width(
+        &self,
+        seq: u64,
+        under_mm: f64,
+        bead: &LaidBead,
+        surface: &SurfaceMap,
+    ) -> Result<WidthMeasurement, &'static str> {
+        let half = self.gauge_length / 2.0;
+        let truth = if half > 0.0 {
+            bead.mean_width(under_mm - half, under_mm + half)
+        } else {
+            bead.width_at(under_mm)
+        };
+        let refused = Reject::NoPair { got: 0.0, need: 1.0 }.status();
+        let truth = truth.ok_or(refused)?;
+        let [noise, _] = hash::normal_pair(hash::mix(&[self.seed, NOISE, seq]));
+        let width = Mm::new(truth + noise * self.noise.get()).map_err(|_| refused)?;
+        let (left, right) = self.edge_points(width, surface).ok_or(refused)?;
+        Ok(WidthMeasurement {
+            width,
+            sigma: self.noise,
+            roughness: Mm::ZERO,
+            left,
+            right,
+            slant_rad: 0.0,
+            hints: Hints { used_share: 1.0, ..Hints::default() },
+        })
+    }
+
+    /// Where the edges of a bead in the middle of the gauge would be seen.
+    fn edge_points(&self, width: Mm, surface: &SurfaceMap) -> Option<(ImagePoint, ImagePoint)> {
+        let middle = surface.to_mm(self.middle)?;
+        let beside = surface.to_mm(self.middle + self.across)?;
+        let half = (beside - middle).try_normalize(1e-12)? * (width.get() / 2.0);
+        Some((surface.to_px(middle - half)?, surface.to_px(middle + half)?))
+    }
+}
+
+/// Keeps the noise of widths apart from other random numbers of a seed.
+const NOISE: u64 = 0x6e6f_6973_65;

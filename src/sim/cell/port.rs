@@ -1,0 +1,63 @@
+//! The simulated robot as the runner's port: the robot's own state machine,
+//! spoken to in the link's lines, without a socket between.
+
+use crate::control::{Command, RobotLimits, RobotMode, RobotState};
+use crate::link::{PcLine, RobotCell, RobotLine};
+use crate::ports::RobotPort;
+use crate::time::Stamp;
+use crate::units::Mm;
+
+/// A robot within the process.
+#[derive(Debug)]
+pub struct SimPort {
+    cell: RobotCell,
+    seq: u64,
+    valid_ms: u64,
+}
+
+impl SimPort {
+    /// A robot that takes setpoints valid for `valid_ms`.
+    pub fn new(cell: RobotCell, valid_ms: u32) -> Self {
+        Self { cell, seq: 0, valid_ms: u64::from(valid_ms) }
+    }
+
+    /// Connects and greets.
+    pub fn connect(&mut self, now: Stamp) -> RobotLimits {
+        self.cell.connect(now);
+        let _ = self.cell.take(now, PcLine::Hello);
+        self.cell.limits()
+    }
+
+    /// Begins a bead; returns the state at its start.
+    pub fn begin(&mut self, now: Stamp, z: Mm) -> RobotState {
+        self.cell.acknowledge(now);
+        self.cell.begin_bead(now, z);
+        self.cell.state(now)
+    }
+
+    /// The robot's state.
+    pub fn state(&mut self, now: Stamp) -> RobotState {
+        self.cell.state(now)
+    }
+}
+
+impl RobotPort for SimPort {
+    fn send(&mut self, now: Stamp, command: Command) -> Option<u64> {
+        let state = self.cell.state(now);
+        let seq = self.seq + 1;
+        let line = match command {
+            Command::Speed(speed) => {
+                if !matches!(state.mode, RobotMode::Print | RobotMode::Hold) {
+                    return None;
+                }
+                PcLine::Speed { seq, speed, valid_ms: self.valid_ms, ref_t_ms: state.t_ms }
+            }
+            Command::Stop => PcLine::Stop { seq },
+        };
+        self.seq = seq;
+        match self.cell.take(now, line) {
+            Some(RobotLine::Err { .. }) => None,
+            _ => Some(seq),
+        }
+    }
+}
