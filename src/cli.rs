@@ -15,6 +15,7 @@ pub mod render;
 pub mod replay;
 pub mod robot_sim;
 pub mod run;
+pub mod simulate;
 
 use std::process::ExitCode;
 
@@ -52,6 +53,7 @@ enum Command {
     Run(run::RunArgs),
     Process(process::ProcessArgs),
     Calibrate(calibrate::CalibrateArgs),
+    Simulate(simulate::SimulateArgs),
     Render(render::RenderArgs),
     RobotSim(robot_sim::RobotSimArgs),
     Replay(replay::ReplayArgs),
@@ -88,6 +90,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(args, voice),
         Command::Process(args) => process::run(args, voice),
         Command::Calibrate(args) => calibrate::run(args).map(|()| ExitCode::SUCCESS),
+        Command::Simulate(args) => simulate::run(args, voice),
         Command::Render(args) => render::run(args).map(|()| ExitCode::SUCCESS),
         Command::RobotSim(args) => robot_sim::run(args).map(|()| ExitCode::SUCCESS),
         Command::Replay(args) => replay::run(args),

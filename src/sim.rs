@@ -1,5 +1,6 @@
 //! The simulated cell: a bead, the world around it and the pictures of it.
 
+pub mod barjuei2022;
 pub mod bead;
 pub mod cell;
 pub mod disturbance;

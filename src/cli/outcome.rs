@@ -32,7 +32,8 @@ pub fn tell(report: &LiveReport, out: &Path, max_rejected_share: f64) -> ExitCod
     status(report, max_rejected_share)
 }
 
-fn figures(summary: &Summary) {
+/// The figures, to standard output.
+pub fn figures(summary: &Summary) {
     println!("frames     {}, {} measured", summary.frames, summary.measured);
     for (reason, count) in &summary.rejected {
         println!("           {count} {reason}");

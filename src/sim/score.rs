@@ -8,7 +8,7 @@ use crate::time::Stamp;
 pub type AlongBead = (f64, f64);
 
 /// Watches one layer and adds up what the tables of the 2022 paper report.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Score {
     target: f64,
     begun: Option<(Stamp, f64)>,

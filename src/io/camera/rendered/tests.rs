@@ -17,6 +17,8 @@ const SMOOTH_STEADY: Simulation = Simulation {
     frame_spacing: None,
     step: Span::from_millis(20),
     robot_bandwidth_hz: 10.0,
+    random_phase: false,
+    gauge_length: Mm::ZERO,
     width_noise: Mm::ZERO,
     bead: BeadModel {
         width_mm: 10.0,

@@ -1,0 +1,140 @@
+//! `truebead simulate`: the closed loop on a simulated cell, as fast as the
+//! machine allows.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::Context;
+use clap::Args;
+
+use super::cell::LoadedCell;
+use super::{Voice, WITH_LOSS, outcome};
+use crate::config::cell::Purpose;
+use crate::control::{Event, Step};
+use crate::offline::{
+    ControlColumns, ControlFacts, FrameRow, LogError, LogOptions, Note, Progress, RunLog,
+};
+use crate::runner::NoRecorder;
+use crate::sim::cell::{LayerEnd, Sight, SimCell, Witness};
+use crate::time::Stamp;
+use crate::units::Mm;
+
+/// Runs the closed loop on a simulated cell.
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Example:
+  truebead simulate cells/barjuei2022.toml --out layer
+
+The scenario is a cell file; [bead], [render] and [simulation] say what is
+simulated. One bead of [simulation] path_mm is laid. level = \"frames\" renders
+and measures every frame; level = \"widths\" takes the true width with noise and
+is thousands of times faster than the clock. Leaves widths.csv, summary.json
+and report.html.")]
+pub struct SimulateArgs {
+    /// Cell file that describes cell, bead and world
+    scenario: PathBuf,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Seed in place of the scenario's
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+/// Runs the command.
+pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
+    let mut loaded = LoadedCell::read(&args.scenario, Purpose::Run)?;
+    if let Some(seed) = args.seed {
+        loaded.cell.simulation.seed = seed;
+    }
+    let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
+    let mut sim = SimCell::new(&loaded.cell, &run, loaded.calibration.clone(), NoRecorder)?;
+    let log = RunLog::create(LogOptions {
+        folder: args.out.clone(),
+        title: format!("Simulation of {}", args.scenario.display()),
+        about: vec![
+            ("scenario".into(), args.scenario.display().to_string()),
+            ("seed".into(), loaded.cell.simulation.seed.to_string()),
+            ("calibration".into(), loaded.calibration_words()),
+        ],
+        gauge: loaded.cell.gauge,
+        target: loaded.cell.target,
+        max_rejected_share: loaded.cell.recording.max_rejected_share,
+        control: Some(ControlFacts { limits: run.limits }),
+    })?;
+    let progress = Progress::new("simulating", "s", None, voice.quiet);
+    let mut logger = Logger { log, failed: None, progress };
+    #[expect(clippy::disallowed_methods, reason = "how much faster than the clock")]
+    let began = Instant::now();
+    let end = sim.layer(Mm::ZERO, &mut logger);
+    let took_s = began.elapsed().as_secs_f64();
+    logger.progress.finish();
+    if let Some(error) = logger.failed {
+        return Err(error.into());
+    }
+    let summary = logger.log.finish()?;
+    outcome::figures(&summary);
+    println!(
+        "time       {:.1} s simulated in {took_s:.3} s, {:.0} times as fast, the log included",
+        end.took.secs(),
+        end.took.secs() / took_s.max(1e-9)
+    );
+    println!("report     {}", args.out.join("report.html").display());
+    Ok(status(&loaded, &summary, end))
+}
+
+fn status(loaded: &LoadedCell, summary: &crate::offline::Summary, end: LayerEnd) -> ExitCode {
+    if !end.whole {
+        eprintln!("error: the robot stopped before the end of the bead; the report says why");
+        return ExitCode::FAILURE;
+    }
+    if summary.rejected_share() > loaded.cell.recording.max_rejected_share {
+        eprintln!("warning: {:.1} % of the frames were refused", summary.rejected_share() * 100.0);
+        return ExitCode::from(WITH_LOSS);
+    }
+    ExitCode::SUCCESS
+}
+
+/// Takes the simulation down.
+struct Logger {
+    log: RunLog,
+    failed: Option<LogError>,
+    progress: Progress,
+}
+
+impl Witness for Logger {
+    fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
+        if step.command.is_some() {
+            self.log.note(&Note::SetpointSent);
+        }
+        self.log.step(now, event, step);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "simulated seconds"
+        )]
+        self.progress.set(now.secs() as u64);
+    }
+
+    fn look(&mut self, sight: &Sight<'_>) {
+        if self.failed.is_some() {
+            return;
+        }
+        let row = FrameRow {
+            frame: sight.seq,
+            time_s: Some(sight.captured_at.secs()),
+            outcome: sight.outcome,
+            control: Some(ControlColumns {
+                bead_path: sight.step.trace.bead_path_mm,
+                bead_expected: sight.step.trace.bead_expected,
+                nozzle_path: sight.step.trace.nozzle_path_mm,
+                speed: sight.speed,
+                setpoint: sight.setpoint,
+                state: sight.step.state.name(),
+                limit: sight.step.trace.limit,
+            }),
+        };
+        self.failed = self.log.frame(&row, sight.frame, sight.edges).err();
+    }
+}
