@@ -13,6 +13,7 @@ pub mod outcome;
 pub mod process;
 pub mod render;
 pub mod replay;
+pub mod reproduce;
 pub mod robot_sim;
 pub mod run;
 pub mod simulate;
@@ -57,6 +58,7 @@ enum Command {
     Render(render::RenderArgs),
     RobotSim(robot_sim::RobotSimArgs),
     Replay(replay::ReplayArgs),
+    Reproduce(reproduce::ReproduceArgs),
     Check(check::CheckArgs),
 }
 
@@ -93,6 +95,7 @@ pub fn main() -> ExitCode {
         Command::Simulate(args) => simulate::run(args, voice),
         Command::Render(args) => render::run(args).map(|()| ExitCode::SUCCESS),
         Command::RobotSim(args) => robot_sim::run(args).map(|()| ExitCode::SUCCESS),
+        Command::Reproduce(args) => reproduce::run(args, voice),
         Command::Replay(args) => replay::run(args),
         Command::Check(args) => check::run(args),
     };

@@ -13,6 +13,7 @@ pub mod picture;
 pub mod progress;
 pub mod replay;
 pub mod report;
+pub mod reproduce;
 pub mod row;
 pub mod stats;
 pub mod summary;

@@ -68,22 +68,7 @@ impl Report<'_> {
             footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))
                 ". The numbers are in summary.json, every frame is in widths.csv." }
         };
-        self.frame(&body).into_string()
-    }
-
-    fn frame(&self, body: &Markup) -> Markup {
-        html! {
-            (DOCTYPE)
-            html lang="en" {
-                head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    title { (self.title) }
-                    style { (PreEscaped(palette::variables())) (PreEscaped(include_str!("report/style.css"))) }
-                }
-                body { main { (body) } }
-            }
-        }
+        whole_page(self.title, &body).into_string()
     }
 
     fn about(&self) -> Markup {
@@ -99,6 +84,23 @@ impl Report<'_> {
             @if !self.remarks.is_empty() {
                 ul { @for remark in self.remarks { li { (remark) } } }
             }
+        }
+    }
+}
+
+/// A page that needs nothing but itself, around its content.
+pub fn whole_page(title: &str, body: &Markup) -> Markup {
+    let style = include_str!("report/style.css");
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (title) }
+                style { (PreEscaped(palette::variables())) (PreEscaped(style)) }
+            }
+            body { main { (body) } }
         }
     }
 }

@@ -223,7 +223,9 @@ pub fn latency(report: &Report<'_>) -> Markup {
     }
 }
 
-fn legend(entries: &[(&str, Ink, &str)]) -> Markup {
+/// What the colours of a plot mean: name, colour and kind of line ("", "dash",
+/// "area" or "block").
+pub fn legend(entries: &[(&str, Ink, &str)]) -> Markup {
     html! {
         div.legend { @for (name, ink, kind) in entries {
             @let property = if matches!(*kind, "" | "dash") { "border-color" } else { "background" };
