@@ -1,0 +1,44 @@
+# What a person types. Everything is built in release, so that one set of
+# dependencies is compiled once and serves the program, its tests and its lints.
+#
+#   make demo SECONDS=60 OUT=my-demo
+#   CARGO_TARGET_DIR=/elsewhere make test
+
+CARGO ?= cargo
+SECONDS ?= 20
+OUT ?=
+# rustup's cargo, where the shell was opened before it was installed.
+export PATH := $(PATH):$(HOME)/.cargo/bin
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint doc bench clean
+
+help: ## say what can be made
+	@echo "truebead: keeps an extruded bead at the width that was asked for"
+	@echo
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1 | \2/p' $(MAKEFILE_LIST) | \
+		while IFS='|' read -r what does; do printf '%-14s%s\n' "$$what" "$$does"; done
+
+setup: ## install what is missing to build it (Debian, Ubuntu), or name it
+	@scripts/setup
+
+demo: setup ## build it and run the whole loop with nothing attached (SECONDS=20, OUT=folder)
+	$(CARGO) build --release --locked
+	$(CARGO) run --release --locked --quiet -- demo --seconds $(SECONDS) $(if $(OUT),--out "$(OUT)")
+
+test: setup lint ## format, lints, every test, and the documentation's links
+	$(CARGO) test --release --locked
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps --document-private-items
+
+lint: setup
+	$(CARGO) fmt --check
+	$(CARGO) clippy --release --locked --all-targets -- -D warnings
+
+doc: setup ## the library's documentation as pages
+	$(CARGO) doc --release --locked --no-deps
+
+bench: setup ## how fast measurement, control and rendering are on this machine
+	$(CARGO) bench --locked --benches
+
+clean: ## throw away what was built
+	$(CARGO) clean
