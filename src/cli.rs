@@ -5,6 +5,8 @@
 //! or configuration; 3 finished, but too many frames were refused or records
 //! were lost.
 
+#![allow(rustdoc::broken_intra_doc_links, reason = "help texts give units in brackets")]
+
 pub mod calibrate;
 pub mod cell;
 pub mod check;

@@ -266,7 +266,7 @@ impl Controller {
             return;
         }
         match state.mode {
-            RobotMode::Idle => self.to_idle(),
+            RobotMode::Idle => self.become_idle(),
             RobotMode::Print => self.printing(now, state, before),
             RobotMode::Hold => {
                 self.follow.reset();
@@ -277,7 +277,7 @@ impl Controller {
         }
     }
 
-    fn to_idle(&mut self) {
+    fn become_idle(&mut self) {
         self.phase = Phase::Idle;
         self.told = None;
         self.limit = Limit::None;
@@ -295,7 +295,7 @@ impl Controller {
     fn printing(&mut self, now: Stamp, state: &RobotState, before: Option<RobotState>) {
         let fresh = before.is_some_and(|last| state.path_mm < last.path_mm);
         if fresh {
-            self.to_idle();
+            self.become_idle();
         }
         if self.phase == Phase::Idle {
             self.bead_start = state.path_mm;
@@ -309,9 +309,12 @@ impl Controller {
                 self.phase = Phase::Fault { why: Fault::SpeedMismatch };
             }
             (Verdict::Mismatch, _) => self.hold_if_printing(now, Hold::SpeedMismatch),
-            (_, Phase::Holding { why, .. })
-                if matches!(why, Hold::RobotHolds | Hold::LinkDown | Hold::SpeedMismatch) =>
-            {
+            (
+                _,
+                Phase::Holding {
+                    why: Hold::RobotHolds | Hold::LinkDown | Hold::SpeedMismatch, ..
+                },
+            ) => {
                 self.resume(now, state);
             }
             _ => {}

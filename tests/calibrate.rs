@@ -1,5 +1,7 @@
 //! `truebead calibrate` on real pictures of a board, and with bad input.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,13 @@
 //! The program as an operator runs it: the demo, a run against a robot, and
 //! what is left when it is killed.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    reason = "a test may fail and look at the clock"
+)]
+
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -80,11 +87,8 @@ fn a_killed_run_leaves_all_but_the_last_second() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("demo");
     let began = Instant::now();
-    let mut child = truebead()
-        .args(["-q", "demo", "--seconds", "60", "--out"])
-        .arg(&out)
-        .spawn()
-        .unwrap();
+    let mut child =
+        truebead().args(["-q", "demo", "--seconds", "60", "--out"]).arg(&out).spawn().unwrap();
     assert!(child.wait_timeout(Duration::from_millis(3500)).unwrap().is_none());
     let ran_s = began.elapsed().as_secs_f64();
     child.kill().unwrap();
@@ -128,7 +132,8 @@ fn a_run_against_a_robot_ends_in_order_on_a_signal() {
     assert!(run.wait_timeout(Duration::from_millis(3500)).unwrap().is_none());
     signal(&run, "-TERM");
     assert_eq!(wait(run), 0);
-    let words: String = said.by_ref().map_while(Result::ok).take_while(|l| !l.contains("STOP")).collect();
+    let words: String =
+        said.by_ref().map_while(Result::ok).take_while(|l| !l.contains("STOP")).collect();
     assert!(words.contains("PRINT"), "{words}");
     signal(&robot, "-INT");
     assert_eq!(wait(robot), 0);

@@ -1,6 +1,8 @@
 //! Rendered frames: `truebead render`, the frames in `test_images`, and what
 //! the measurement makes of frames whose truth is known.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -15,7 +15,7 @@ pub fn free_folder(name: &str) -> PathBuf {
     if !taken(&first) {
         return first;
     }
-    (2u32..)
+    (2u32..=9999)
         .map(|n| PathBuf::from(format!("{name}-{n}")))
         .find(|path| !taken(path))
         .unwrap_or(first)

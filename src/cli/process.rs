@@ -80,8 +80,8 @@ pub fn run(args: &ProcessArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     Ok(conclude(args, &summary, &loaded))
 }
 
-fn wrong_input(error: SourceError) -> WrongArguments {
-    WrongArguments::new(format!("{}: {}", error.source_name, error.what))
+fn wrong_input(SourceError { source_name, what }: SourceError) -> WrongArguments {
+    WrongArguments::new(format!("{source_name}: {what}"))
 }
 
 /// Where frames are measured one after the other.

@@ -128,13 +128,15 @@ impl Experiments<'_> {
         theirs: &LayerResult,
         ours: Option<&LayerResult>,
     ) {
-        let figures: [(&str, &str, f64, fn(&LayerResult) -> f64); 3] = [
-            ("mean error", "mm", layer.mean_error_mm, |r| r.mean_error_mm),
-            ("RMS error", "mm", layer.rms_error_mm, |r| r.rms_error_mm),
-            ("mean speed", "mm/s", layer.mean_speed_mm_per_s, |r| r.mean_speed_mm_per_s),
-        ];
-        for (quantity, unit, published, of) in figures {
-            self.row((case, quantity, unit), Some(published), Some(of(theirs)), ours.map(of));
+        let figures = |found: &LayerResult| {
+            [found.mean_error_mm, found.rms_error_mm, found.mean_speed_mm_per_s]
+        };
+        let published = [layer.mean_error_mm, layer.rms_error_mm, layer.mean_speed_mm_per_s];
+        let names = [("mean error", "mm"), ("RMS error", "mm"), ("mean speed", "mm/s")];
+        for (which, (quantity, unit)) in names.into_iter().enumerate() {
+            let ours = ours.map(|found| figures(found)[which]);
+            let simulated = Some(figures(theirs)[which]);
+            self.row((case, quantity, unit), Some(published[which]), simulated, ours);
         }
     }
 

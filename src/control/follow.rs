@@ -17,9 +17,9 @@ const FAULT_AFTER: Span = Span::from_millis(2000);
 /// Watches the speed that is read back.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Follow {
-    slower_since: Option<Stamp>,
-    faster_since: Option<Stamp>,
-    outside_since: Option<Stamp>,
+    slower: Option<Stamp>,
+    faster: Option<Stamp>,
+    outside: Option<Stamp>,
 }
 
 /// What the speed read back says.
@@ -43,17 +43,17 @@ impl Follow {
     pub fn observe(&mut self, now: Stamp, told: MmPerS, driven: MmPerS) -> Verdict {
         let off = driven - told;
         let share = off.get() / told.get().max(1.0);
-        mark(&mut self.slower_since, now, share < -LIMITED);
-        mark(&mut self.faster_since, now, share > LIMITED);
-        mark(&mut self.outside_since, now, share.abs() > TOLERANCE);
+        mark(&mut self.slower, now, share < -LIMITED);
+        mark(&mut self.faster, now, share > LIMITED);
+        mark(&mut self.outside, now, share.abs() > TOLERANCE);
         let lasts = |since: Option<Stamp>, span: Span| since.is_some_and(|at| now - at > span);
-        if lasts(self.outside_since, FAULT_AFTER) {
+        if lasts(self.outside, FAULT_AFTER) {
             Verdict::Lost
-        } else if lasts(self.outside_since, HOLD_AFTER) {
+        } else if lasts(self.outside, HOLD_AFTER) {
             Verdict::Mismatch
-        } else if lasts(self.slower_since, LIMITED_AFTER) {
+        } else if lasts(self.slower, LIMITED_AFTER) {
             Verdict::Slower
-        } else if lasts(self.faster_since, LIMITED_AFTER) {
+        } else if lasts(self.faster, LIMITED_AFTER) {
             Verdict::Faster
         } else {
             Verdict::Follows

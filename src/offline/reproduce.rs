@@ -43,10 +43,11 @@ pub fn table(rows: &[Row]) -> String {
     );
     for row in rows {
         let [published, simulated, ours] = [row.published, row.simulated, row.ours].map(number);
-        text += &format!(
+        let line = format!(
             "{:width$}  {:28} {:5} {published:>9} {simulated:>9} {ours:>9}\n",
             row.case, row.quantity, row.unit
         );
+        text.push_str(&line);
     }
     text
 }

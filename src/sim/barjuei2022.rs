@@ -106,11 +106,12 @@ fn one(cell: &Cell, run: &RunPart, target_mm: f64, seed: u64) -> Result<(Score, 
     let mut score = Score::new(target_mm);
     let _ = sim.layer(Mm::ZERO, &mut score);
     let length = cell.simulation.path.get();
-    let laid: Vec<AlongBead> = (0u32..)
-        .map(f64::from)
-        .take_while(|at| *at < length)
-        .filter_map(|at| Some((at, sim.bead().width_at(at)?)))
-        .collect();
+    let mut laid: Vec<AlongBead> = Vec::new();
+    let mut at = 0.0;
+    while at < length {
+        laid.extend(sim.bead().width_at(at).map(|width| (at, width)));
+        at += 1.0;
+    }
     let scatter = score.scatter(&laid, 700.0);
     Ok((score, scatter))
 }
@@ -209,9 +210,9 @@ pub fn stack(cell: &Cell, run: &RunPart, aside_mm: f64) -> Result<Stack, SimErro
         let mut run = run.clone();
         run.control.target = Mm::constant(38.0);
         let mut sim = SimCell::new(&cell, &run, calibration, NoRecorder)?;
-        let mut watch = Middles { surface, score: Score::new(38.0), middles: Vec::new() };
+        let mut watch = Middles { surface, score: Score::new(38.0), across_mm: Vec::new() };
         let _ = sim.layer(z, &mut watch);
-        middles[layer] = super::score::mean(watch.middles.iter().copied());
+        middles[layer] = super::score::mean(watch.across_mm.iter().copied());
         widths[layer] = super::score::mean(watch.score.widths.iter().map(|(_, w)| *w));
         truths[layer] = super::score::mean(watch.score.true_widths.iter().map(|(_, w)| *w));
     }
@@ -237,7 +238,7 @@ fn raised_camera(layer_mm: f64) -> Calibration {
 struct Middles {
     surface: SurfaceMap,
     score: Score,
-    middles: Vec<f64>,
+    across_mm: Vec<f64>,
 }
 
 impl super::cell::Witness for Middles {
@@ -251,7 +252,7 @@ impl super::cell::Witness for Middles {
             && let (Some(left), Some(right)) =
                 (self.surface.to_mm(measured.left), self.surface.to_mm(measured.right))
         {
-            self.middles.push(f64::midpoint(left.x, right.x));
+            self.across_mm.push(f64::midpoint(left.x, right.x));
         }
     }
 }

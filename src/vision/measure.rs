@@ -116,7 +116,7 @@ impl Measurer {
         }
         self.sort_out()?;
         self.check_contrast()?;
-        self.to_width(&view, surface)
+        self.width_on(&view, surface)
     }
 
     fn find_candidates(&mut self) {
@@ -244,7 +244,7 @@ impl Measurer {
         *self.scatter.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 
-    fn to_width(&mut self, view: &View, surface: &SurfaceMap) -> Result<WidthMeasurement, Reject> {
+    fn width_on(&mut self, view: &View, surface: &SurfaceMap) -> Result<WidthMeasurement, Reject> {
         let hints = Hints {
             contrast_grey: f64::midpoint(self.contrast(true), self.contrast(false)),
             blur_px: f64::midpoint(self.left.blur_px, self.right.blur_px),

@@ -37,7 +37,7 @@ impl View {
 
     /// The image point of gauge coordinates.
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    pub fn to_image(&self, u: f64, v: f64) -> ImagePoint {
+    pub fn to_image(self, u: f64, v: f64) -> ImagePoint {
         let (x, y) = (self.roi.x as f64, self.roi.y as f64);
         match self.axis {
             Axis::Vertical => ImagePoint::new(x + u, y + v),

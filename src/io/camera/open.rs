@@ -62,9 +62,10 @@ pub fn recorded(path: &Path, options: OfflineOptions<'_>) -> Result<Recorded, So
 
 /// Whether a name is that of an MCAP, finished or cut short.
 pub fn is_mcap(path: &Path) -> bool {
-    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-    let name = name.to_ascii_lowercase();
-    name.ends_with(".mcap") || name.ends_with(".mcap.partial")
+    let ends = |path: &Path, ending: &str| {
+        path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
+    };
+    ends(path, "mcap") || (ends(path, "partial") && ends(&path.with_extension(""), "mcap"))
 }
 
 /// Opens the camera of a cell, but for the rendered one. Recorded frames are

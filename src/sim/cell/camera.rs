@@ -170,4 +170,4 @@ impl SimCamera {
 }
 
 /// Keeps the noise of widths apart from other random numbers of a seed.
-const NOISE: u64 = 0x6e6f_6973_65;
+const NOISE: u64 = 0x006e_6f69_7365;
