@@ -1,0 +1,55 @@
+//! Every cell that is shipped is sound for what it says that it is for.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use truebead::config::Cell;
+use truebead::config::cell::{CalibrationSource, Purpose};
+use truebead::io::calibration_file;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn cells_in(folder: &Path) -> Vec<PathBuf> {
+    let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    files.filter(|path| path.extension().is_some_and(|e| e == "toml")).collect()
+}
+
+#[test]
+fn shipped_cells_are_sound() {
+    let cells = cells_in(&root().join("cells"));
+    assert!(cells.len() >= 4);
+    for path in cells {
+        let text = fs::read_to_string(&path).unwrap();
+        let only_measures = path.ends_with("process.toml");
+        let purpose = if only_measures { Purpose::Measure } else { Purpose::Run };
+        let cell = Cell::parse(&path, &text, purpose).unwrap_or_else(|e| panic!("{e}"));
+        if let CalibrationSource::File(file) = &cell.calibration {
+            calibration_file::read(file).unwrap_or_else(|e| panic!("{e}"));
+        }
+        assert_eq!(cell.run.is_none(), only_measures);
+    }
+}
+
+#[test]
+fn the_cell_of_the_contract_is_taken_as_it_stands() {
+    let text = r#"
+[calibration]
+file = "calib/cell.toml"
+surface_height_mm = 20.0
+[gauge]
+roi_px = [40, 20, 640, 500]
+bead_axis = "vertical"
+polarity = "bright"
+width_range_mm = [20.0, 60.0]
+channel = "grey"
+[control]
+target_width_mm = 42.0
+"#;
+    let cell = Cell::parse(Path::new("x/cell.toml"), text, Purpose::Measure).unwrap();
+    assert_eq!(cell.target.unwrap().get(), 42.0);
+    assert_eq!(cell.calibration, CalibrationSource::File("x/calib/cell.toml".into()));
+}
