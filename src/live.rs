@@ -171,8 +171,7 @@ fn open_camera(
         simulation.picture,
         simulation.seed,
     )?;
-    let (source, view, _truth) =
-        RenderedCamera::new(renderer, simulation, camera, live.clock, ending);
+    let (source, view) = RenderedCamera::new(renderer, simulation, camera, live.clock, ending);
     Ok((Box::new(source), Some(view)))
 }
 

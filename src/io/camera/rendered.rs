@@ -1,7 +1,6 @@
 //! The rendered camera: pictures of a simulated bead that follows the path and
 //! speed that the robot reports.
 
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
@@ -14,7 +13,6 @@ use crate::io::clock::RunClock;
 use crate::ports::{FrameSource, Grab, SourceError};
 use crate::sim::follow::{Follower, Recipe};
 use crate::sim::render::Renderer;
-use crate::sim::truth::Truth;
 use crate::time::{Span, Stamp};
 
 /// Reports that wait for the camera: some 20 s of a robot that reports every
@@ -34,24 +32,6 @@ impl RobotView {
     }
 }
 
-/// Truth of the frames that a camera gave, by frame. Copies show the same.
-#[derive(Debug, Clone, Default)]
-pub struct TruthLog(Arc<Mutex<Vec<TruthRow>>>);
-
-/// Number of a frame, and its truth if the bead ran through the whole gauge.
-pub type TruthRow = (u64, Option<Truth>);
-
-impl TruthLog {
-    /// Everything so far, in the order of the frames.
-    pub fn rows(&self) -> Vec<TruthRow> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-
-    fn push(&self, seq: u64, truth: Option<Truth>) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).push((seq, truth));
-    }
-}
-
 /// Takes pictures at a fixed rate of what lies under the camera.
 pub struct RenderedCamera {
     renderer: Renderer,
@@ -62,7 +42,6 @@ pub struct RenderedCamera {
     period: Span,
     offset_mm: f64,
     rides: bool,
-    truths: TruthLog,
     seq: u64,
     due: Option<Stamp>,
     first: Option<Stamp>,
@@ -77,7 +56,7 @@ impl RenderedCamera {
         camera: &Camera,
         clock: RunClock,
         stop: Receiver<()>,
-    ) -> (Self, RobotView, TruthLog) {
+    ) -> (Self, RobotView) {
         let recipe = Recipe {
             model: simulation.bead,
             roughness: simulation.roughness,
@@ -85,7 +64,6 @@ impl RenderedCamera {
             seed: simulation.seed,
         };
         let (told, reports) = bounded(WAITING_REPORTS);
-        let truths = TruthLog::default();
         let source = Self {
             renderer,
             follower: Follower::new(recipe),
@@ -95,12 +73,11 @@ impl RenderedCamera {
             period: Span::from_secs(1.0 / camera.rate_hz),
             offset_mm: camera.offset.get(),
             rides: camera.mount == Mount::Flange,
-            truths: truths.clone(),
             seq: 0,
             due: None,
             first: None,
         };
-        (source, RobotView(told), truths)
+        (source, RobotView(told))
     }
 
     /// Waits until the next frame is due; false when the camera was stopped.
@@ -137,7 +114,6 @@ impl FrameSource for RenderedCamera {
             .renderer
             .render(self.seq, captured_at, robot_z, &|along| bead.edges_at(under? + along))
             .map_err(|error| fault("rendered", error.to_string()))?;
-        self.truths.push(self.seq, rendered.truth);
         self.seq += 1;
         let first = *self.first.get_or_insert(captured_at);
         let time_s = Some((captured_at - first).secs());
