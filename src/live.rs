@@ -132,6 +132,8 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         latencies: latency::Latencies::default(),
         scribe: &scribe,
         notice: live.notice,
+        limits: live.run.limits,
+        unfit: None,
         shown: None,
         speed: None,
         setpoint: None,

@@ -64,18 +64,25 @@ fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
             eprintln!("error: the camera gives no more frames: {why}");
             return ExitCode::FAILURE;
         }
+        Ending::RobotLimits(why) => {
+            eprintln!("error: {why}");
+            return ExitCode::from(2);
+        }
         Ending::RecordingLost(why) => {
             eprintln!("error: control ended in hold, because the run could not be recorded: {why}");
             return ExitCode::from(WITH_LOSS);
         }
         _ if faults > 0 => {
-            eprintln!("error: the controller gave up {faults} times; the report says why");
+            let times = if faults == 1 { "once".to_owned() } else { format!("{faults} times") };
+            eprintln!("error: the controller gave up {times}; the report says why");
             return ExitCode::FAILURE;
         }
         Ending::Asked | Ending::TimeOver | Ending::LastFrame => {}
     }
+    // A run that somebody ends early may have seen little more than the bead's
+    // beginning; that is no loss.
     let share = report.summary.rejected_share();
-    if share > max_rejected_share {
+    if share > max_rejected_share && report.ending != Ending::Asked {
         eprintln!(
             "warning: {:.1} % of the frames were refused, the cell bears {:.1} %",
             share * 100.0,

@@ -10,12 +10,13 @@ use crossbeam_channel::{Receiver, never, select};
 use super::eye::{Look, Seen};
 use super::latency::Latencies;
 use super::scribe::Scribe;
-use crate::control::{Command, Event, RobotMode, State, Step};
+use crate::control::limiter::Limits;
+use crate::control::{Command, Event, RobotLimits, RobotMode, State, Step};
 use crate::io::camera::rendered::RobotView;
 use crate::io::clock::RunClock;
 use crate::io::record::RecorderHandle;
 use crate::io::robot::{LinkClient, RobotEvent, Written};
-use crate::offline::{ControlColumns, FrameRow, Note};
+use crate::offline::{ControlColumns, FrameRow, Note, names};
 use crate::ports::{RecordError, RobotPort};
 use crate::runner::{Handled, Runner};
 use crate::time::{Span, Stamp};
@@ -38,6 +39,8 @@ pub enum Ending {
     CameraLost(String),
     /// What happened could not be recorded.
     RecordingLost(String),
+    /// The robot's limits are narrower than the cell's.
+    RobotLimits(String),
 }
 
 /// The link as the runner's robot, which remembers when it last wrote.
@@ -80,6 +83,8 @@ pub struct Loop<'a> {
     pub latencies: Latencies,
     pub scribe: &'a Scribe,
     pub notice: Box<dyn FnMut(&str) + Send>,
+    pub limits: Limits,
+    pub unfit: Option<String>,
     pub shown: Option<State>,
     pub speed: Option<MmPerS>,
     pub setpoint: Option<MmPerS>,
@@ -173,6 +178,9 @@ impl Loop<'_> {
                 recv(stop) -> _ => return Ending::Asked,
                 default(duration(wait)) => {}
             }
+            if let Some(why) = self.unfit.take() {
+                return Ending::RobotLimits(why);
+            }
             if let Some(error) = self.runner.failure() {
                 return Ending::RecordingLost(error.0.clone());
             }
@@ -198,11 +206,11 @@ impl Loop<'_> {
             return;
         }
         let words = match &step.state {
-            State::Holding(why) => format!("holding: {}", crate::offline::names::hold(why)),
-            State::Fault(why) => format!("fault: {}", crate::offline::names::fault(why)),
+            State::Holding(why) => format!("holding: {}", names::spoken(names::hold(why))),
+            State::Fault(why) => format!("fault: {}", names::spoken(&names::fault(why))),
             state => state.name().to_owned(),
         };
-        (self.notice)(&format!("{:8.2} s  {}", now.secs(), words.replace('_', " ")));
+        (self.notice)(&format!("{:8.2} s  {}", now.secs(), words));
         self.shown = Some(step.state.clone());
     }
 
@@ -280,6 +288,7 @@ impl Loop<'_> {
             }
             RobotEvent::Up { robot, .. } => {
                 (self.notice)(&format!("robot `{}` is connected", robot.name));
+                self.unfit = unfit(&self.limits, robot);
             }
             RobotEvent::Down { reason, .. } => (self.notice)(&format!("robot: {reason}")),
             RobotEvent::Refused { seq, code, text, .. } => {
@@ -289,6 +298,18 @@ impl Loop<'_> {
         let (_, event) = event.into_event();
         self.give(event);
     }
+}
+
+/// Why a robot cannot be driven with a cell's limits, if it cannot.
+fn unfit(limits: &Limits, robot: &RobotLimits) -> Option<String> {
+    let fits = robot.min_mm_per_s <= limits.min_speed && limits.max_speed <= robot.max_mm_per_s;
+    (!fits).then(|| {
+        format!(
+            "robot `{}` takes {} to {}, the cell's [limits] are {} to {}; make them lie within \
+             the robot's",
+            robot.name, robot.min_mm_per_s, robot.max_mm_per_s, limits.min_speed, limits.max_speed
+        )
+    })
 }
 
 fn duration(span: Span) -> Duration {
