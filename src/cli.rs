@@ -96,7 +96,7 @@ pub fn main() -> ExitCode {
         Command::Process(args) => process::run(args, voice),
         Command::Calibrate(args) => calibrate::run(args).map(|()| ExitCode::SUCCESS),
         Command::Simulate(args) => simulate::run(args, voice),
-        Command::Render(args) => render::run(args).map(|()| ExitCode::SUCCESS),
+        Command::Render(args) => render::run(args, voice).map(|()| ExitCode::SUCCESS),
         Command::RobotSim(args) => robot_sim::run(args).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(args, voice),
         Command::Replay(args) => replay::run(args),

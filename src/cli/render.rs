@@ -1,26 +1,23 @@
 //! `truebead render`: frames of a simulated bead, with their truth.
 
 use std::fs::{self, File};
-use std::io::{ErrorKind, IsTerminal};
+use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result};
 use clap::Args;
 use image::{ExtendedColorType, ImageEncoder, codecs::png};
-use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
-use super::WrongArguments;
-use crate::calib::Calibration;
+use super::cell::LoadedCell;
+use super::{Voice, WrongArguments};
 use crate::config::Cell;
 use crate::config::cell::{CalibrationSource, Purpose};
 use crate::frame::Frame;
-use crate::io::calibration_file;
+use crate::offline::Progress;
 use crate::sim::scenario::Series;
 use crate::sim::truth::Truth;
-
-/// Frames from one plain line of progress to the next.
-const PLAIN_EVERY: u64 = 100;
 
 /// Renders frames of a simulated bead, with the truth of each.
 #[derive(Debug, Args)]
@@ -44,11 +41,9 @@ pub struct RenderArgs {
 }
 
 /// Renders a scenario into a folder, which appears when it is whole.
-pub fn run(args: &RenderArgs) -> Result<()> {
-    let text = fs::read_to_string(&args.scenario)
-        .map_err(|e| WrongArguments::new(format!("{}: {e}", args.scenario.display())))?;
-    let cell = Cell::parse(&args.scenario, &text, Purpose::Measure).map_err(WrongArguments::new)?;
-    let calibration = read_calibration(&cell)?;
+pub fn run(args: &RenderArgs, voice: Voice) -> Result<()> {
+    let LoadedCell { cell, calibration, text, .. } =
+        LoadedCell::read(&args.scenario, Purpose::Measure)?;
     let series = Series::new(&cell, calibration)
         .map_err(|error| WrongArguments::new(format!("{}: {error}", args.scenario.display())))?;
     refuse_files_in(&args.out)?;
@@ -63,7 +58,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         .permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777))
         .tempdir_in(parent)
         .with_context(|| format!("cannot write in {}", parent.display()))?;
-    let truths = write_frames(&series, frames, folder.path())?;
+    let truths = write_frames(&series, frames, folder.path(), voice)?;
     write_tables(&series, &truths, folder.path()).context("cannot write the tables")?;
     copy_scenario(&cell, &args.scenario, &text, folder.path())
         .context("cannot copy the scenario")?;
@@ -71,22 +66,13 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     fs::rename(folder.path(), &args.out)
         .with_context(|| format!("cannot make {}", args.out.display()))?;
     let _renamed = folder.keep();
-    eprintln!(
+    println!(
         "{frames} frames, {:.3} mm of bead apart, laid at {:.1} mm/s: {}",
         series.spacing_mm(),
         series.speed_mm_per_s(),
         args.out.display()
     );
     Ok(())
-}
-
-fn read_calibration(cell: &Cell) -> Result<Calibration> {
-    match &cell.calibration {
-        CalibrationSource::Scale(mm_per_px) => Ok(Calibration::Scale { mm_per_px: *mm_per_px }),
-        CalibrationSource::File(path) => {
-            Ok(calibration_file::read(path).map_err(WrongArguments::new)?)
-        }
-    }
 }
 
 fn refuse_files_in(out: &Path) -> Result<()> {
@@ -106,19 +92,26 @@ fn refuse_files_in(out: &Path) -> Result<()> {
 }
 
 /// Renders and writes all frames, and returns what is true of each.
-fn write_frames(series: &Series, frames: u64, folder: &Path) -> Result<Vec<Option<Truth>>> {
-    let progress = Progress::new(frames);
-    (0..frames)
+fn write_frames(
+    series: &Series,
+    frames: u64,
+    folder: &Path,
+    voice: Voice,
+) -> Result<Vec<Option<Truth>>> {
+    let progress = Mutex::new(Progress::new("rendering", "frames", Some(frames), voice.quiet));
+    let truths = (0..frames)
         .into_par_iter()
         .map(|number| {
             let rendered = series.render(number)?;
             let path = folder.join(format!("frame_{number:05}.png"));
             write_png(&rendered.frame, &path)
                 .with_context(|| format!("cannot write frame {number}"))?;
-            progress.step();
+            progress.lock().unwrap_or_else(PoisonError::into_inner).advance();
             Ok(rendered.truth)
         })
-        .collect()
+        .collect();
+    progress.into_inner().unwrap_or_else(PoisonError::into_inner).finish();
+    truths
 }
 
 fn write_png(frame: &Frame, path: &Path) -> Result<()> {
@@ -180,41 +173,4 @@ fn copy_scenario(cell: &Cell, scenario: &Path, text: &str, folder: &Path) -> Res
         fs::copy(path, copy)?;
     }
     Ok(())
-}
-
-/// A bar on a terminal, a line now and then elsewhere.
-struct Progress {
-    bar: Option<ProgressBar>,
-    frames: u64,
-    done: std::sync::atomic::AtomicU64,
-}
-
-impl Progress {
-    fn new(frames: u64) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}")
-                .unwrap_or_else(|_| ProgressStyle::default_bar());
-            ProgressBar::new(frames).with_style(style).with_message("rendering")
-        });
-        Self { bar, frames, done: std::sync::atomic::AtomicU64::new(0) }
-    }
-
-    fn step(&self) {
-        let done = self.done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
-        match &self.bar {
-            Some(bar) => bar.inc(1),
-            None if done.is_multiple_of(PLAIN_EVERY) => {
-                eprintln!("rendered {done} of {} frames", self.frames);
-            }
-            None => {}
-        }
-    }
-}
-
-impl Drop for Progress {
-    fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
-    }
 }

@@ -4,6 +4,8 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use crate::io::whole_file;
+
 /// An output that could not be written, where, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
@@ -100,18 +102,10 @@ impl Write for Partial {
 
 /// Writes a file whose content is at hand. A failure leaves nothing behind.
 pub fn write_whole(folder: &Path, name: &str, content: &[u8]) -> Result<PathBuf, LogError> {
-    let mut partial = Partial::create(folder, name)?;
-    let leftover = partial.growing.clone();
-    let written = match partial.write_all(content) {
-        Ok(()) => partial.finish(),
-        Err(source) => Err(partial.error(source)),
-    };
-    if written.is_err() {
-        // The first failure is what is reported; a rest under another name
-        // harms nobody.
-        let _ = fs::remove_file(leftover);
-    }
-    written
+    let path = folder.join(name);
+    whole_file::write_whole(&path, content)
+        .map_err(|error| LogError::Write { path: error.path, source: error.source })?;
+    Ok(path)
 }
 
 #[cfg(test)]
