@@ -20,7 +20,9 @@ fn it_says_where_it_listens_what_happens_and_ends_in_order() {
     pc.say("HELLO 1 me\n");
     assert_eq!(pc.hear().as_deref(), Some("HELLO 1 tx 60 150 60"));
     while !pc.hear_one("STATE").contains(" PRINT ") {}
-    let killed = Command::new("kill").args(["-TERM", &robot.id().to_string()]).status().unwrap();
+    // The shell's own kill: a small system has no program of that name.
+    let line = format!("kill -TERM {}", robot.id());
+    let killed = Command::new("sh").args(["-c", &line]).status().unwrap();
     assert!(killed.success());
     assert_eq!(robot.wait().unwrap().code(), Some(0));
     let mut rest = String::new();
