@@ -15,18 +15,21 @@
 //! baseline.
 
 mod axis;
-mod blur;
 mod edge;
 mod edge_lines;
-mod fit;
 pub mod gauge;
 mod measure;
+mod noise;
 mod outlier;
+mod overlay;
 mod pair;
+mod path;
 mod pool;
-mod refine;
 pub mod reject;
 mod step;
+mod strip;
+mod template;
+mod trace;
 pub mod width;
 
 pub use gauge::{Axis, Gauge, Method, Polarity};

@@ -9,9 +9,9 @@ use crate::geometry::{ImagePoint, SurfacePoint};
 use crate::units::Mm;
 
 use super::gauge::Gauge;
-use super::pool::View;
-use super::refine::Located;
 use super::reject::Reject;
+use super::strip::View;
+use super::trace::Located;
 use super::width::{Hints, WidthMeasurement};
 
 /// Largest angle between the bead and the gauge's axis that is measured: the

@@ -4,6 +4,9 @@
 /// enough to gather a blurred edge, narrow enough to keep two apart.
 pub const REACH: usize = 4;
 
+/// Places that are passed over together where nothing reaches the floor.
+const BLOCK: usize = 64;
+
 /// Steps of each sign that are kept a profile.
 pub const KEPT: usize = 16;
 
@@ -37,55 +40,81 @@ impl Candidates {
     }
 
     /// Looks for the strongest steps of a profile's response that reach the
-    /// floor.
-    pub fn find(response: &[f32], floor: f32) -> Self {
+    /// floor. `unit` is a response of 1 in grey levels.
+    #[inline(always)]
+    pub fn find(response: &[i16], floor: f32, unit: f32) -> Self {
         let mut found = Self::default();
-        for u in 1..response.len().saturating_sub(1) {
-            let here = response[u];
-            let size = here.abs();
-            if size < floor {
-                continue;
+        #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+        let floor = (floor / unit).ceil() as i16;
+        let last = response.len().saturating_sub(1);
+        let mut start = 0;
+        for block in response.chunks(BLOCK) {
+            let end = start + block.len();
+            if strongest(block) >= floor {
+                for u in start.max(1)..end.min(last) {
+                    found.look_at([response[u - 1], response[u], response[u + 1]], u, floor, unit);
+                }
             }
-            let (before, after) = (response[u - 1], response[u + 1]);
-            if here > 0.0 && here >= before && here > after {
-                keep(&mut found.up, &mut found.ups, peak(u, before, here, after));
-            } else if here < 0.0 && here <= before && here < after {
-                keep(&mut found.down, &mut found.downs, peak(u, -before, size, -after));
-            }
+            start = end;
         }
         found
     }
-}
 
-/// Mean of the pixels after each place less the mean of those before it:
-/// the height of a sharp step there. Places too near the ends have none.
-pub fn respond(profile: &[f32], response: &mut [f32]) {
-    response.fill(0.0);
-    if profile.len() <= 2 * REACH {
-        return;
-    }
-    let span = profile.len() - 2 * REACH;
-    let inner = &mut response[REACH..REACH + span];
-    for offset in 1..=REACH {
-        let after = &profile[REACH + offset..][..span];
-        let before = &profile[REACH - offset..][..span];
-        for ((sum, &a), &b) in inner.iter_mut().zip(after).zip(before) {
-            *sum += a - b;
+    #[inline(always)]
+    fn look_at(&mut self, [before, here, after]: [i16; 3], u: usize, floor: i16, unit: f32) {
+        if here >= floor {
+            if here >= before && here > after {
+                keep(&mut self.up, &mut self.ups, peak(u, [before, here, after], unit));
+            }
+        } else if here <= -floor && here <= before && here < after {
+            keep(&mut self.down, &mut self.downs, peak(u, [-before, -here, -after], unit));
         }
     }
-    #[expect(clippy::cast_precision_loss, reason = "REACH is small")]
-    let scale = 1.0 / REACH as f32;
-    for value in inner {
-        *value *= scale;
+}
+
+/// Size of the strongest response.
+#[inline(always)]
+fn strongest(block: &[i16]) -> i16 {
+    let mut strongest = 0;
+    for value in block {
+        strongest = strongest.max(value.abs());
+    }
+    strongest
+}
+
+/// Sum of the REACH pixels after each place less the sum of those before it:
+/// REACH times the height of a sharp step there. Places too near the ends have
+/// none.
+#[inline(always)]
+pub fn respond(profile: &[u16], response: &mut [i16]) {
+    let length = profile.len();
+    if length <= 2 * REACH {
+        response.fill(0);
+        return;
+    }
+    let span = length - 2 * REACH;
+    response[..REACH].fill(0);
+    response[length - REACH..].fill(0);
+    let part = |offset: usize| &profile[offset..][..span];
+    let (a, b, c, d) = (part(0), part(1), part(2), part(3));
+    let (e, f, g, h) = (part(5), part(6), part(7), part(8));
+    let inner = &mut response[REACH..length - REACH];
+    for u in 0..span {
+        let before = (a[u] + b[u]) + (c[u] + d[u]);
+        let after = (e[u] + f[u]) + (g[u] + h[u]);
+        // Both fit 15 bits, so that the difference is a signed number of 16.
+        inner[u] = after.wrapping_sub(before).cast_signed();
     }
 }
 
 /// Vertex of the parabola through a peak and its neighbours.
-fn peak(u: usize, before: f32, here: f32, after: f32) -> Candidate {
+fn peak(u: usize, [before, here, after]: [i16; 3], unit: f32) -> Candidate {
+    let (before, here, after) = (f32::from(before), f32::from(here), f32::from(after));
     let bend = before - 2.0 * here + after;
     let shift = if bend < 0.0 { 0.5 * (before - after) / bend } else { 0.0 };
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    Candidate { at: u as f32 + shift.clamp(-0.5, 0.5), step: here }
+    let u = u as f32;
+    Candidate { at: u + shift.clamp(-0.5, 0.5), step: here * unit }
 }
 
 fn keep(kept: &mut [Candidate; KEPT], count: &mut usize, new: Candidate) {
@@ -109,15 +138,18 @@ fn keep(kept: &mut [Candidate; KEPT], count: &mut usize, new: Candidate) {
 mod tests {
     use super::*;
 
-    fn bar() -> Vec<f32> {
-        (0..80).map(|u| if (20..50).contains(&u) { 120.0 } else { 40.0 }).collect()
+    fn bar() -> Vec<u16> {
+        (0..80).map(|u| if (20..50).contains(&u) { 480 } else { 160 }).collect()
     }
+
+    /// A profile in quarters of a grey level, summed over REACH.
+    const UNIT: f32 = 0.0625;
 
     #[test]
     fn a_sharp_step_responds_with_its_height_halfway_between_the_pixels() {
-        let mut response = vec![0.0; 80];
+        let mut response = vec![0; 80];
         respond(&bar(), &mut response);
-        let found = Candidates::find(&response, 20.0);
+        let found = Candidates::find(&response, 20.0, UNIT);
         assert_eq!((found.up().len(), found.down().len()), (1, 1));
         assert!((found.up()[0].at - 19.5).abs() <= 0.5);
         assert!((found.up()[0].step - 80.0).abs() < 1e-3);
@@ -126,11 +158,11 @@ mod tests {
 
     #[test]
     fn only_the_strongest_are_kept() {
-        let mut response = vec![0.0f32; 100];
+        let mut response = vec![0; 100];
         for k in 0..20u8 {
-            response[5 + 4 * usize::from(k)] = f32::from((k * 7) % 20 + 1);
+            response[5 + 4 * usize::from(k)] = 16 * i16::from((k * 7) % 20 + 1);
         }
-        let found = Candidates::find(&response, 1.0);
+        let found = Candidates::find(&response, 1.0, UNIT);
         let mut steps: Vec<f32> = found.up().iter().map(|c| c.step).collect();
         steps.sort_by(f32::total_cmp);
         assert_eq!(steps, (5..=20u8).map(f32::from).collect::<Vec<f32>>());
@@ -138,8 +170,16 @@ mod tests {
 
     #[test]
     fn a_profile_that_is_too_short_has_no_steps() {
-        let mut response = [1.0; 8];
-        respond(&[0.0; 8], &mut response);
-        assert_eq!(response, [0.0; 8]);
+        let mut response = [1; 8];
+        respond(&[0; 8], &mut response);
+        assert_eq!(response, [0; 8]);
+    }
+
+    #[test]
+    fn the_largest_step_fits() {
+        let profile: Vec<u16> = (0..40).map(|u| if u < 20 { 0 } else { 4095 }).collect();
+        let mut response = vec![0; 40];
+        respond(&profile, &mut response);
+        assert_eq!(response.iter().max(), Some(&(4 * 4095)));
     }
 }

@@ -1,19 +1,21 @@
 //! One frame after the other: bands, candidates, chain, sub-pixel edges, width.
 
 use crate::calib::SurfaceMap;
-use crate::frame::{Frame, Pixels};
+use crate::frame::Frame;
 use crate::geometry::ImagePoint;
 
 use super::axis::{self, Caliper};
-use super::edge::{Candidates, respond};
+use super::edge::{Candidates, REACH, respond};
 use super::edge_lines;
 use super::gauge::{Gauge, Method, Polarity};
+use super::noise;
 use super::outlier;
 use super::pair::{Chain, Search};
-use super::pool::{Bands, View};
-use super::refine::{Refiner, Task};
+use super::pool::Bands;
 use super::reject::Reject;
 use super::step::StepTable;
+use super::strip::{Grey, Strip, Strips, Turner, View};
+use super::trace::{Scene, Tracer};
 use super::width::{Edges, Hints, WidthMeasurement};
 
 /// Share of the caliper lines that must show the bead.
@@ -27,20 +29,33 @@ const RANGE_SLACK: f64 = 1.5;
 /// an edge, not noise.
 const MAX_SCATTER_PX: f64 = 1.5;
 
+/// Steps that noise alone makes are passed over up to so many of its standard
+/// deviations.
+const FLOOR_SIGMA: f32 = 3.0;
+
 /// Measures frames of one cell; keeps its memory from frame to frame.
 #[derive(Debug, Clone)]
 pub struct Measurer {
     gauge: Gauge,
     white: Option<u16>,
+    turner: Turner,
+    work: Work,
+}
+
+/// What a measurement works on.
+#[derive(Debug, Clone)]
+struct Work {
+    gauge: Gauge,
     table: StepTable,
     bands: Bands,
-    response: Vec<f32>,
-    sample: Vec<f32>,
+    noise: f32,
+    memory: Vec<f32>,
+    response: Vec<i16>,
     candidates: Vec<Candidates>,
     chain: Chain,
     other: Chain,
-    left: Refiner,
-    right: Refiner,
+    left: Tracer,
+    right: Tracer,
     scatter: Vec<f64>,
     calipers: Vec<Caliper>,
     left_px: Vec<ImagePoint>,
@@ -51,28 +66,29 @@ impl Measurer {
     /// For a gauge. `white` is the upper end of the camera's scale where it is
     /// not that of the pixels, as with 12 bits in 16.
     pub fn new(gauge: Gauge, white: Option<u16>) -> Self {
-        Self {
+        let work = Work {
             gauge,
-            white,
             table: StepTable::default(),
             bands: Bands::default(),
+            noise: 0.0,
+            memory: Vec::new(),
             response: Vec::new(),
-            sample: Vec::new(),
             candidates: Vec::new(),
             chain: Chain::default(),
             other: Chain::default(),
-            left: Refiner::default(),
-            right: Refiner::default(),
+            left: Tracer::default(),
+            right: Tracer::default(),
             scatter: Vec::new(),
             calipers: Vec::new(),
             left_px: Vec::new(),
             right_px: Vec::new(),
-        }
+        };
+        Self { gauge, white, turner: Turner::default(), work }
     }
 
     /// The edges behind the last width, for pictures of them.
     pub fn edges(&self) -> Edges<'_> {
-        Edges { left: &self.left_px, right: &self.right_px }
+        Edges { left: &self.work.left_px, right: &self.work.right_px }
     }
 
     /// Measures the bead in a frame on a surface.
@@ -81,71 +97,96 @@ impl Measurer {
         frame: &Frame,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
-        self.left_px.clear();
-        self.right_px.clear();
+        let work = &mut self.work;
+        work.left_px.clear();
+        work.right_px.clear();
         if !self.gauge.roi.fits(frame.size()) {
             return Err(Reject::WrongSize { image: frame.size() });
         }
         if self.gauge.method == Method::EdgeLines {
-            let points = (&mut self.left_px, &mut self.right_px);
+            let points = (&mut work.left_px, &mut work.right_px);
             return edge_lines::measure(&self.gauge, frame, surface, points);
         }
-        let white = self.white.unwrap_or(match frame.pixels() {
-            Pixels::Grey8(_) => 255,
-            Pixels::Grey16(_) => u16::MAX,
-        });
         let view = View::new(self.gauge.roi, self.gauge.axis);
-        self.bands.pool(frame, &view, self.gauge.calipers, white);
-        self.find_candidates();
-        let range = self.search_range(&view, surface)?;
-        self.find_chain(&view, range)?;
-        let task = Task {
-            frame,
-            view: &view,
-            bands: &self.bands,
-            white,
-            width_px: typical_width(&self.chain),
-        };
-        let pairs = self.chain.pairs();
-        let left =
-            self.left.refine(&self.table, &task, true, pairs.iter().map(|p| p.map(|p| p.left)));
-        let right =
-            self.right.refine(&self.table, &task, false, pairs.iter().map(|p| p.map(|p| p.right)));
-        if !(left && right) {
-            return Err(Reject::NoPair { got: 0.0, need: NEED_SHARE });
+        let strips = self.turner.strips(frame, &view, self.white);
+        pulp::Arch::new().dispatch(Task { work, strips, view: &view, surface })
+    }
+}
+
+/// A measurement as the processor's vectors do it: the same code is compiled
+/// for each width of vectors, and the widest that there is runs.
+struct Task<'a> {
+    work: &'a mut Work,
+    strips: Strips<'a>,
+    view: &'a View,
+    surface: &'a SurfaceMap,
+}
+
+impl pulp::WithSimd for Task<'_> {
+    type Output = Result<WidthMeasurement, Reject>;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
+        match self.strips {
+            Strips::Bytes(strip) => self.work.measure(&strip, self.view, self.surface),
+            Strips::Words(strip) => self.work.measure(&strip, self.view, self.surface),
         }
+    }
+}
+
+impl Work {
+    #[inline(always)]
+    fn measure<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        view: &View,
+        surface: &SurfaceMap,
+    ) -> Result<WidthMeasurement, Reject> {
+        let range = self.search_range(view, surface)?;
+        self.noise = noise::of(strip, &mut self.memory);
+        self.bands.pool(strip, self.gauge.calipers);
+        self.find_candidates();
+        self.find_chain(view, range)?;
+        self.trace(strip)?;
         self.sort_out()?;
         self.check_contrast()?;
-        self.width_on(&view, surface)
+        self.width_on(view, surface)
     }
 
+    #[inline(always)]
     fn find_candidates(&mut self) {
-        let count = self.bands.count();
-        let across = self.bands.profile(0).len();
-        self.response.resize(across * count, 0.0);
-        for (band, response) in self.response.chunks_exact_mut(across).enumerate() {
-            respond(self.bands.profile(band), response);
-        }
-        let floor = self.floor();
-        self.candidates.clear();
-        self.candidates
-            .extend(self.response.chunks_exact(across).map(|r| Candidates::find(r, floor)));
-    }
-
-    /// Smallest step that is looked at: above most of what noise makes, and
-    /// well below what is believed in the end.
-    fn floor(&mut self) -> f32 {
-        self.sample.clear();
-        self.sample.extend(self.response.iter().step_by(13).map(|step| step.abs()));
-        let middle = self.sample.len() / 2;
-        let typical = if self.sample.is_empty() {
-            0.0
-        } else {
-            1.4826 * *self.sample.select_nth_unstable_by(middle, f32::total_cmp).1
-        };
+        // A step is the difference of two means of REACH pooled pixels.
+        #[expect(clippy::cast_precision_loss, reason = "REACH is small")]
+        let noise = self.noise * (2.0 / (4.0 * REACH as f32)).sqrt();
         #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
         let least = (0.4 * self.gauge.min_contrast_grey) as f32;
-        least.max(1.5 * typical)
+        let floor = least.max(FLOOR_SIGMA * noise);
+        #[expect(clippy::cast_precision_loss, reason = "REACH is small")]
+        let unit = self.bands.unit() / REACH as f32;
+        self.candidates.clear();
+        for band in 0..self.bands.count() {
+            let profile = self.bands.profile(band);
+            self.response.resize(profile.len(), 0);
+            respond(profile, &mut self.response);
+            self.candidates.push(Candidates::find(&self.response, floor, unit));
+        }
+    }
+
+    #[inline(always)]
+    fn trace<T: Grey>(&mut self, strip: &Strip<'_, T>) -> Result<(), Reject> {
+        let pairs = self.chain.pairs();
+        let scene = Scene {
+            strip,
+            bands: &self.bands,
+            noise: self.noise,
+            width_px: narrowest(&self.chain, &mut self.memory),
+            bead_after: true,
+        };
+        let lefts = pairs.iter().map(|pair| pair.map(|pair| pair.left));
+        let rights = pairs.iter().map(|pair| pair.map(|pair| pair.right));
+        let left = self.left.trace(&self.table, &scene, lefts);
+        let right = self.right.trace(&self.table, &Scene { bead_after: false, ..scene }, rights);
+        if left && right { Ok(()) } else { Err(Reject::NoPair { got: 0.0, need: NEED_SHARE }) }
     }
 
     /// The believed widths in pixels across the gauge's middle.
@@ -248,7 +289,7 @@ impl Measurer {
         let hints = Hints {
             contrast_grey: f64::midpoint(self.contrast(true), self.contrast(false)),
             blur_px: f64::midpoint(self.left.blur_px, self.right.blur_px),
-            noise_grey: f64::midpoint(self.left.noise_grey, self.right.noise_grey),
+            noise_grey: self.noise.into(),
             saturated_share: self.bands.saturated_share(),
             used_share: 0.0,
         };
@@ -270,13 +311,13 @@ impl Measurer {
     }
 }
 
-/// Median width of the chain's pairs \[px\], for the size of windows; the
-/// mean will do.
-fn typical_width(chain: &Chain) -> f64 {
-    let (mut sum, mut n) = (0.0, 0.0);
-    for pair in chain.pairs().iter().flatten() {
-        sum += f64::from(pair.right - pair.left);
-        n += 1.0;
+/// A narrow width among the chain's pairs \[px\], for the size of windows.
+fn narrowest(chain: &Chain, memory: &mut Vec<f32>) -> f32 {
+    memory.clear();
+    memory.extend(chain.pairs().iter().flatten().map(|pair| pair.right - pair.left));
+    let rank = memory.len() / 10;
+    if memory.is_empty() {
+        return 0.0;
     }
-    sum / f64::max(n, 1.0)
+    *memory.select_nth_unstable_by(rank, f32::total_cmp).1
 }

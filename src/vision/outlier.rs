@@ -1,6 +1,6 @@
 //! Calipers that disagree with their neighbours: grains, sparks, wrong picks.
 
-use super::refine::Located;
+use super::trace::Located;
 
 /// Distances at which neighbours are asked.
 const SPANS: [usize; 3] = [1, 2, 3];
@@ -63,7 +63,7 @@ mod tests {
         (0..30u32)
             .map(|k| {
                 let at = 50.0 + 0.3 * f64::from(k) + 0.02 * f64::from(k % 3);
-                Some(Located { at, variance: 0.01, height: 80.0 })
+                Some(Located { at, variance: 0.01, height: 80.0, share: 1.0 })
             })
             .collect()
     }

@@ -248,16 +248,16 @@ mod tests {
     use crate::vision::edge::respond;
 
     /// A profile of bright bars on dark ground.
-    fn bars(bars: &[(usize, usize, f32)]) -> Candidates {
-        let mut profile = vec![40.0; 200];
+    fn bars(bars: &[(usize, usize, u16)]) -> Candidates {
+        let mut profile = vec![160; 200];
         for &(from, to, height) in bars {
             for value in &mut profile[from..to] {
-                *value += height;
+                *value += 4 * height;
             }
         }
-        let mut response = vec![0.0; 200];
+        let mut response = vec![0; 200];
         respond(&profile, &mut response);
-        Candidates::find(&response, 5.0)
+        Candidates::find(&response, 5.0, 0.0625)
     }
 
     const BRIGHT: Search = Search { bright: true, width_px: (10.0, 80.0), band_px: 4.0 };
@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn the_chain_follows_the_bead_and_skips_what_is_hidden() {
         let bands: Vec<Candidates> = (0..20)
-            .map(|k| if k == 7 || k == 8 { bars(&[]) } else { bars(&[(60 + k, 100 + k, 80.0)]) })
+            .map(|k| if k == 7 || k == 8 { bars(&[]) } else { bars(&[(60 + k, 100 + k, 80)]) })
             .collect();
         let mut chain = Chain::default();
         chain.search(&bands, &BRIGHT);
@@ -280,9 +280,9 @@ mod tests {
         let bands: Vec<Candidates> = (0..20)
             .map(|k| {
                 if k % 5 == 0 {
-                    bars(&[(60, 100, 60.0), (130, 150, 160.0)])
+                    bars(&[(60, 100, 60), (130, 150, 160)])
                 } else {
-                    bars(&[(60, 100, 60.0)])
+                    bars(&[(60, 100, 60)])
                 }
             })
             .collect();
@@ -293,7 +293,7 @@ mod tests {
 
     #[test]
     fn the_gap_between_two_beads_is_not_bridged() {
-        let bands = vec![bars(&[(50, 75, 80.0), (85, 110, 80.0)]); 20];
+        let bands = vec![bars(&[(50, 75, 80), (85, 110, 80)]); 20];
         let mut chain = Chain::default();
         chain.search(&bands, &BRIGHT);
         let pair = chain.pairs()[3].unwrap();
@@ -302,7 +302,7 @@ mod tests {
 
     #[test]
     fn polarity_and_width_are_heeded() {
-        let bands = vec![bars(&[(60, 100, 80.0)]); 20];
+        let bands = vec![bars(&[(60, 100, 80)]); 20];
         let mut chain = Chain::default();
         chain.search(&bands, &Search { bright: false, ..BRIGHT });
         assert_eq!(chain.share(), 0.0);

@@ -1,0 +1,502 @@
+//! The profile of an edge, from rows all along it laid over each other: its
+//! blur, how far its surroundings on either side are plain, and how they are
+//! shaded. Rows that differ from most, because a grain or a spark lies on
+//! them, are left out.
+
+use super::step::StepTable;
+use super::strip::{Grey, Strip};
+
+/// Rows that are laid over each other at most.
+const ROWS: usize = 100;
+/// Farthest sample from the edge on either side \[px\].
+pub const REACH: usize = 40;
+const SPAN: usize = 2 * REACH;
+/// Rows are laid down at the nearest of so many places between pixels.
+const PHASES: usize = 2;
+/// Samples this near the edge tell whether a row is like the others \[px\].
+const CORE: usize = 12;
+/// A row that differs from the mean by so many times what rows do in the
+/// median is left out; the second time, when the mean is a better one.
+const UNLIKE: [f32; 2] = [2.0, 1.7];
+/// Blur that the place's rounding to half a pixel adds \[px²\].
+const ROUNDING: f64 = 1.0 / 48.0;
+
+const LEAST_BLUR_PX: f64 = 0.3;
+const MOST_BLUR_PX: f64 = 15.0;
+const MAX_STEPS: usize = 12;
+
+/// Where and how an edge lies in the rows of a strip.
+pub trait Path {
+    /// Position of the edge in a row \[px\].
+    fn at(&self, v: usize) -> f32;
+    /// Level before the edge and step to the level after it in a row
+    /// \[grey levels\].
+    fn levels(&self, v: usize) -> (f32, f32);
+}
+
+/// Samples that are free of anything but this edge, on either side \[px\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Towards smaller places.
+    pub before: f64,
+    /// Towards larger ones.
+    pub after: f64,
+}
+
+/// An edge as the overlay shows it, in shares of the step that was given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shape {
+    /// How far the edge lies from the path \[px\].
+    pub at: f64,
+    /// Blur of the edge as the standard deviation of a Gaussian \[px\],
+    /// integration over pixels included.
+    pub blur: f64,
+    /// Level before the edge.
+    pub before: f64,
+    /// Level after it.
+    pub after: f64,
+    /// How far the surroundings are plain, and what is used of them.
+    pub extent: Extent,
+    /// Change of the level for each pixel away from the edge, before and after
+    /// it \[1/px\].
+    pub shading: (f64, f64),
+}
+
+/// Lays rows over each other; keeps its memory from frame to frame.
+#[derive(Debug, Clone)]
+pub struct Overlay {
+    rows: Vec<[f32; SPAN]>,
+    phases: Vec<usize>,
+    unlike: Vec<f32>,
+    sorted: Vec<f32>,
+    mean: [[f32; SPAN]; PHASES],
+    counts: [f32; PHASES],
+}
+
+impl Default for Overlay {
+    fn default() -> Self {
+        Self {
+            rows: Vec::new(),
+            phases: Vec::new(),
+            unlike: Vec::new(),
+            sorted: Vec::new(),
+            mean: [[0.0; SPAN]; PHASES],
+            counts: [0.0; PHASES],
+        }
+    }
+}
+
+impl Overlay {
+    /// Lays down rows along a path.
+    #[inline(always)]
+    pub fn lay<T: Grey>(&mut self, strip: &Strip<'_, T>, path: &impl Path) {
+        let count = strip.along.min(ROWS);
+        self.rows.resize(count, [0.0; SPAN]);
+        self.phases.resize(count, 0);
+        self.unlike.resize(count, 0.0);
+        let mut pixels = [T::default(); SPAN];
+        for k in 0..count {
+            let v = (2 * k + 1) * strip.along / (2 * count);
+            let (place, phase) = split(path.at(v), PHASES);
+            self.phases[k] = phase;
+            fetch(strip, v, place - REACH.cast_signed(), &mut pixels);
+            let (before, step) = path.levels(v);
+            let (scale, shift) = (strip.scale / step, before / step);
+            for (sample, pixel) in self.rows[k].iter_mut().zip(&pixels) {
+                #[expect(clippy::cast_precision_loss, reason = "16 bits fit a float")]
+                let level = pixel.level() as f32;
+                *sample = level * scale - shift;
+            }
+        }
+        self.average(f32::INFINITY);
+        for many in UNLIKE {
+            let limit = many * self.judge();
+            self.average(limit);
+        }
+    }
+
+    /// Means of the rows that are not unlike the others.
+    #[inline(always)]
+    fn average(&mut self, limit: f32) {
+        self.mean = [[0.0; SPAN]; PHASES];
+        self.counts = [0.0; PHASES];
+        for ((row, &phase), &unlike) in self.rows.iter().zip(&self.phases).zip(&self.unlike) {
+            if unlike > limit {
+                continue;
+            }
+            self.counts[phase] += 1.0;
+            for (sum, sample) in self.mean[phase].iter_mut().zip(row) {
+                *sum += sample;
+            }
+        }
+        for (mean, count) in self.mean.iter_mut().zip(self.counts) {
+            let share = 1.0 / f32::max(count, 1.0);
+            for value in mean {
+                *value *= share;
+            }
+        }
+    }
+
+    /// How far each row lies from the mean about the edge; returns the median.
+    #[inline(always)]
+    fn judge(&mut self) -> f32 {
+        for ((row, &phase), unlike) in self.rows.iter().zip(&self.phases).zip(&mut self.unlike) {
+            let mean = &self.mean[phase];
+            let mut lanes = [0.0f32; 8];
+            let core = REACH - CORE..REACH + CORE;
+            for (a, b) in row[core.clone()].chunks_exact(8).zip(mean[core].chunks_exact(8)) {
+                for k in 0..8 {
+                    let miss = a[k] - b[k];
+                    lanes[k] += miss * miss;
+                }
+            }
+            *unlike = lanes.iter().sum();
+        }
+        self.sorted.clear();
+        self.sorted.extend_from_slice(&self.unlike);
+        let middle = self.sorted.len() / 2;
+        if self.sorted.is_empty() {
+            return f32::INFINITY;
+        }
+        *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1
+    }
+
+    /// Rows that the means are of.
+    pub fn used(&self) -> f64 {
+        f64::from(self.counts.iter().sum::<f32>())
+    }
+
+    /// Each sample's distance from the path, its value and its weight.
+    fn samples(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64, f64)> {
+        (0..PHASES).filter(|&phase| self.counts[phase] > 0.0).flat_map(move |phase| {
+            let shift = offset(phase, PHASES);
+            let weight = f64::from(self.counts[phase]);
+            let first = index((from + shift).ceil());
+            let last = index((to + shift).floor() + 1.0);
+            (first..last).map(move |k| {
+                let distance = place(k) - shift;
+                (distance, f64::from(self.mean[phase][k]), weight)
+            })
+        })
+    }
+
+    /// Reads the edge's shape. `noise` is the standard deviation of a pixel
+    /// as a share of the step, `room` how far to look. `None` where no step
+    /// can be fitted.
+    pub fn shape(&self, table: &StepTable, noise: f64, room: Extent) -> Option<Shape> {
+        let (slope, steepest) = self.steepest(room)?;
+        let start = Shape {
+            at: steepest,
+            blur: (0.4 / slope).clamp(0.5, MOST_BLUR_PX),
+            before: 0.0,
+            after: 1.0,
+            extent: room,
+            shading: (0.0, 0.0),
+        };
+        let room = self.up_to_neighbours(start, noise, room);
+        let mut shape = self.fit(table, Shape { extent: room, ..start }, noise)?;
+        shape.blur = (shape.blur * shape.blur - ROUNDING).max(LEAST_BLUR_PX.powi(2)).sqrt();
+        let (before, shading_before) = self.plain(table, &shape, noise, -1.0, room.before);
+        let (after, shading_after) = self.plain(table, &shape, noise, 1.0, room.after);
+        shape.extent = Extent { before, after };
+        shape.shading = (shading_before, shading_after);
+        Some(shape)
+    }
+
+    /// Steepest slope of the overlay near the path \[1/px\], and where.
+    fn steepest(&self, room: Extent) -> Option<(f64, f64)> {
+        let (from, to) = (-room.before.min(8.0), room.after.min(8.0));
+        let mut best = (0.0, 0.0);
+        for (distance, _, _) in self.samples(from, to) {
+            let slope = self.slope(distance);
+            if slope > best.0 {
+                best = (slope, distance);
+            }
+        }
+        (best.0 > 0.01).then_some(best)
+    }
+
+    /// Mean slope over two pixels about a distance that is a multiple of half
+    /// a pixel, of both phases \[1/px\].
+    fn slope(&self, distance: f64) -> f64 {
+        let (mut sum, mut n) = (0.0, 0.0);
+        for phase in 0..PHASES {
+            let weight = f64::from(self.counts[phase]);
+            let k = index((distance + offset(phase, PHASES)).round()).clamp(1, SPAN - 2);
+            let rise = f64::from(self.mean[phase][k + 1] - self.mean[phase][k - 1]);
+            sum += weight * rise / 2.0;
+            n += weight;
+        }
+        sum / f64::max(n, 1.0)
+    }
+
+    /// Cuts the room off half-way to a neighbouring step: where the slope has
+    /// fallen off and rises again, in either direction.
+    fn up_to_neighbours(&self, start: Shape, noise: f64, room: Extent) -> Extent {
+        let noise = noise / (2.0 * self.used().max(1.0)).sqrt();
+        let notable = (5.0 * noise).max(0.06 / start.blur.max(1.0));
+        let cut = |sign: f64, room: f64| {
+            let mut lowest = (f64::INFINITY, 0.0);
+            let mut away = (1.2 * start.blur).max(1.0);
+            while away < room - 1.0 {
+                let slope = self.slope(((start.at + sign * away) * 2.0).round() / 2.0).abs();
+                if slope < lowest.0 {
+                    lowest = (slope, away);
+                }
+                if slope > lowest.0 + notable {
+                    return lowest.1;
+                }
+                away += 0.5;
+            }
+            room
+        };
+        Extent { before: cut(-1.0, room.before), after: cut(1.0, room.after) }
+    }
+
+    /// Fits place, blur, levels and a little shading about the edge.
+    fn fit(&self, table: &StepTable, start: Shape, noise: f64) -> Option<Shape> {
+        let mut shape = start;
+        // Shading is held near none, because over a short way it could pass
+        // for a shift of the edge.
+        let mut shading = [0.0; 2];
+        let ridge = (noise / 0.02).powi(2);
+        for _ in 0..MAX_STEPS {
+            let reach = 4.5 * shape.blur + 2.0;
+            let from = (shape.at - reach.min(start.extent.before)).max(-place_limit());
+            let to = (shape.at + reach.min(start.extent.after)).min(place_limit());
+            let mut normal = Normal::<6>::default();
+            for (distance, value, weight) in self.samples(from, to) {
+                let z = (distance - shape.at) / shape.blur;
+                let (step, density) = table.at(z);
+                let height = shape.after - shape.before;
+                let depth =
+                    [shape.blur * (density - z * (1.0 - step)), shape.blur * (density + z * step)];
+                let slope = height * density / shape.blur;
+                let miss = value
+                    - shape.before * (1.0 - step)
+                    - shape.after * step
+                    - shading[0] * depth[0]
+                    - shading[1] * depth[1];
+                normal.add(
+                    [-slope, -slope * z, 1.0 - step, step, depth[0], depth[1]],
+                    miss,
+                    weight,
+                );
+            }
+            normal.hold(4, ridge, -shading[0]);
+            normal.hold(5, ridge, -shading[1]);
+            let step = normal.solve()?;
+            shape.at += step[0].clamp(-shape.blur, shape.blur);
+            shape.blur = (shape.blur + step[1].clamp(-0.5 * shape.blur, 0.5 * shape.blur))
+                .clamp(LEAST_BLUR_PX, MOST_BLUR_PX);
+            shape.before += step[2];
+            shape.after += step[3];
+            shading[0] += step[4];
+            shading[1] += step[5];
+            if step[0].abs() < 2e-3 && step[1].abs() < 2e-3 * shape.blur {
+                break;
+            }
+        }
+        let inside = shape.at > -start.extent.before && shape.at < start.extent.after;
+        (inside && shape.after - shape.before > 0.1).then_some(shape)
+    }
+
+    /// How far from the edge a side is plain, that is a straight line within
+    /// what noise explains, and the slope of that line \[1/px away from the
+    /// edge\] as far as it is sure.
+    fn plain(
+        &self,
+        table: &StepTable,
+        shape: &Shape,
+        noise: f64,
+        sign: f64,
+        room: f64,
+    ) -> (f64, f64) {
+        let height = shape.after - shape.before;
+        let first = 3.0 * shape.blur;
+        let mut line = Line::default();
+        let mut end = first.min(room);
+        while end + 2.0 <= room {
+            let mut block = Line::default();
+            let (near, far) = (shape.at + sign * end, shape.at + sign * (end + 2.0));
+            for (distance, value, weight) in self.samples(near.min(far), near.max(far) - 1e-9) {
+                let (step, _) = table.at((distance - shape.at) / shape.blur);
+                let miss = value - shape.before - height * step;
+                block.add(sign * (distance - shape.at), miss, weight);
+            }
+            if block.weight <= 0.0 {
+                break;
+            }
+            let (expected, variance) = line.at(block.middle());
+            let off = block.mean() - expected;
+            let doubt = noise * noise * (variance + 1.0 / block.weight);
+            if line.weight > 0.0 && off.abs() > 4.0 * doubt.sqrt() + 0.006 * height {
+                break;
+            }
+            line.join(&block);
+            end += 2.0;
+        }
+        (end, line.sure_slope(noise))
+    }
+}
+
+/// Running sums of a straight line.
+#[derive(Debug, Clone, Copy, Default)]
+struct Line {
+    weight: f64,
+    x: f64,
+    y: f64,
+    xx: f64,
+    xy: f64,
+}
+
+impl Line {
+    fn add(&mut self, x: f64, y: f64, weight: f64) {
+        self.weight += weight;
+        self.x += weight * x;
+        self.y += weight * y;
+        self.xx += weight * x * x;
+        self.xy += weight * x * y;
+    }
+
+    fn join(&mut self, other: &Self) {
+        self.weight += other.weight;
+        self.x += other.x;
+        self.y += other.y;
+        self.xx += other.xx;
+        self.xy += other.xy;
+    }
+
+    fn middle(&self) -> f64 {
+        self.x / self.weight
+    }
+
+    fn mean(&self) -> f64 {
+        self.y / self.weight
+    }
+
+    fn spread(&self) -> f64 {
+        self.xx - self.x * self.x / self.weight
+    }
+
+    fn slope(&self) -> f64 {
+        (self.xy - self.x * self.y / self.weight) / self.spread()
+    }
+
+    /// What the line is at a place, and its variance in units of a sample's;
+    /// a slope that has not been seen over a few pixels is taken for none,
+    /// with room for a little.
+    fn at(&self, x: f64) -> (f64, f64) {
+        if self.weight <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let away = x - self.middle();
+        if self.spread() < 2.0 * self.weight {
+            return (self.mean(), 1.0 / self.weight);
+        }
+        (self.mean() + self.slope() * away, 1.0 / self.weight + away * away / self.spread())
+    }
+
+    /// The slope less what noise may have made of it: nothing below two
+    /// standard deviations, nearly all far above.
+    fn sure_slope(&self, noise: f64) -> f64 {
+        if self.weight <= 0.0 || self.spread() < 2.0 * self.weight {
+            return 0.0;
+        }
+        let slope = self.slope();
+        let variance = noise * noise / self.spread();
+        slope * (1.0 - 4.0 * variance / (slope * slope)).max(0.0)
+    }
+}
+
+/// Normal equations of a small fit.
+struct Normal<const N: usize> {
+    matrix: nalgebra::SMatrix<f64, N, N>,
+    vector: nalgebra::SVector<f64, N>,
+}
+
+impl<const N: usize> Default for Normal<N> {
+    fn default() -> Self {
+        Self { matrix: nalgebra::SMatrix::zeros(), vector: nalgebra::SVector::zeros() }
+    }
+}
+
+impl<const N: usize> Normal<N> {
+    fn add(&mut self, row: [f64; N], miss: f64, weight: f64) {
+        for i in 0..N {
+            let weighted = weight * row[i];
+            self.vector[i] += weighted * miss;
+            for j in 0..=i {
+                self.matrix[(i, j)] += weighted * row[j];
+            }
+        }
+    }
+
+    fn hold(&mut self, which: usize, weight: f64, miss: f64) {
+        self.matrix[(which, which)] += weight;
+        self.vector[which] += weight * miss;
+    }
+
+    fn solve(&mut self) -> Option<nalgebra::SVector<f64, N>>
+    where
+        nalgebra::Const<N>: nalgebra::DimMin<nalgebra::Const<N>>,
+    {
+        for k in 0..N {
+            self.matrix[(k, k)] *= 1.0 + 1e-9;
+            self.matrix[(k, k)] += 1e-12;
+        }
+        self.matrix.fill_upper_triangle_with_lower_triangle();
+        Some(self.matrix.cholesky()?.solve(&self.vector))
+    }
+}
+
+/// Splits a place into the pixel at or before it and the nearest of `phases`
+/// places between that and the next.
+#[inline(always)]
+pub fn split(at: f32, phases: usize) -> (isize, usize) {
+    #[expect(clippy::cast_precision_loss, reason = "there are few phases")]
+    let fine = at * phases as f32 + 0.5;
+    #[expect(clippy::cast_possible_truncation, reason = "a place near the gauge")]
+    let whole = fine as isize;
+    // Truncation is a floor but for what is left of the gauge.
+    let fine = whole - isize::from(fine < 0.0);
+    let phases = phases.cast_signed();
+    (fine.div_euclid(phases), fine.rem_euclid(phases).cast_unsigned())
+}
+
+/// Where a phase lies after its pixel \[px\].
+#[expect(clippy::cast_precision_loss, reason = "there are few phases")]
+pub fn offset(phase: usize, phases: usize) -> f64 {
+    phase as f64 / phases as f64
+}
+
+/// Pixels of a row from a place on, which may lie beyond the row's ends.
+#[inline(always)]
+pub fn fetch<T: Grey>(strip: &Strip<'_, T>, v: usize, start: isize, out: &mut [T]) {
+    let row = strip.row(v);
+    match usize::try_from(start).ok().and_then(|from| row.get(from..from + out.len())) {
+        Some(pixels) => out.copy_from_slice(pixels),
+        None => strip.fetch(v, start, out),
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "the window is short")]
+fn place(index: usize) -> f64 {
+    index as f64 - REACH as f64
+}
+
+#[expect(clippy::cast_precision_loss, reason = "the window is short")]
+fn place_limit() -> f64 {
+    REACH as f64 - 1.0
+}
+
+/// Number of the sample at a whole distance, within the window.
+#[expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to the window"
+)]
+fn index(distance: f64) -> usize {
+    (distance + REACH as f64).clamp(0.0, SPAN as f64) as usize
+}

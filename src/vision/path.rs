@@ -1,0 +1,169 @@
+//! Rough places and levels, one a band, made into smooth ones that every row
+//! can be held against.
+
+use super::overlay::Path;
+use super::pool::Bands;
+
+/// Bands on either side that a smoothed value is taken from.
+const NEIGHBOURS: usize = 3;
+
+/// Fills gaps from their neighbours, in a straight line; `false` where there
+/// is nothing at all.
+pub fn fill(rough: impl Iterator<Item = Option<f32>>, out: &mut Vec<f32>) -> bool {
+    out.clear();
+    let mut last: Option<usize> = None;
+    for (band, value) in rough.enumerate() {
+        out.push(value.unwrap_or(f32::NAN));
+        let Some(value) = value else { continue };
+        let from = last.map_or(value, |last| out[last]);
+        let first = last.map_or(0, |last| last + 1);
+        #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
+        let gap = (band - last.unwrap_or(0)).max(1) as f32;
+        for (between, place) in (first..band).enumerate() {
+            #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
+            let share = if last.is_some() { (between + 1) as f32 / gap } else { 0.0 };
+            out[place] = from + share * (value - from);
+        }
+        last = Some(band);
+    }
+    let Some(last) = last else { return false };
+    let end = out[last];
+    out[last + 1..].fill(end);
+    true
+}
+
+/// Median of three, so that a single wild value leads nothing astray.
+pub fn median_of_three(values: &mut [f32]) {
+    let Some(mut before) = values.first().copied() else { return };
+    for k in 1..values.len().saturating_sub(1) {
+        let here = values[k];
+        let after = values[k + 1];
+        values[k] = before.max(here.min(after)).min(here.max(after));
+        before = here;
+    }
+}
+
+/// Replaces each value by the straight line through its neighbours.
+pub fn smooth(values: &[f32], out: &mut Vec<f32>) {
+    out.clear();
+    let count = values.len();
+    let window = (2 * NEIGHBOURS + 1).min(count);
+    for band in 0..count {
+        let from = band.saturating_sub(NEIGHBOURS).min(count - window);
+        let (mut mean, mut slope) = (0.0, 0.0);
+        #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
+        let middle = (window - 1) as f32 / 2.0;
+        let mut spread = 0.0;
+        for (k, value) in values[from..from + window].iter().enumerate() {
+            #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
+            let away = k as f32 - middle;
+            mean += value;
+            slope += away * value;
+            spread += away * away;
+        }
+        #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
+        let (count, away) = (window as f32, (band - from) as f32 - middle);
+        out.push(mean / count + if spread > 0.0 { slope / spread * away } else { 0.0 });
+    }
+}
+
+/// What is expected of an edge in every row.
+#[derive(Debug, Clone, Default)]
+pub struct Rows {
+    /// Place, level before and step of each row.
+    values: Vec<[f32; 3]>,
+}
+
+impl Rows {
+    /// Draws lines between the middles of the bands and on beyond the first
+    /// and the last.
+    pub fn draw(&mut self, bands: &Bands, at: &[f32], before: &[f32], step: &[f32]) {
+        self.values.clear();
+        let of = |band: usize| [at[band], before[band], step[band]];
+        let count = bands.count();
+        if count == 1 {
+            self.values.resize(bands.rows(0).1, of(0));
+            return;
+        }
+        for band in 0..count - 1 {
+            let (middle, next) = (narrow(bands.middle(band)), narrow(bands.middle(band + 1)));
+            let first = if band == 0 { 0 } else { self.values.len() };
+            let last = if band + 2 == count { bands.rows(count - 1).1 } else { ceil(next) };
+            let (here, there) = (of(band), of(band + 1));
+            let per_row = 1.0 / (next - middle);
+            let slope = [
+                (there[0] - here[0]) * per_row,
+                (there[1] - here[1]) * per_row,
+                (there[2] - here[2]) * per_row,
+            ];
+            for v in first..last {
+                #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+                let away = v as f32 - middle;
+                // Levels are not carried on beyond the last that was seen.
+                let within = away.clamp(0.0, next - middle);
+                self.values.push([
+                    here[0] + away * slope[0],
+                    here[1] + within * slope[1],
+                    here[2] + within * slope[2],
+                ]);
+            }
+        }
+    }
+
+    /// Place, level before and step of a row.
+    #[inline(always)]
+    pub fn of(&self, v: usize) -> [f32; 3] {
+        self.values[v]
+    }
+}
+
+impl Path for Rows {
+    #[inline(always)]
+    fn at(&self, v: usize) -> f32 {
+        self.values[v][0]
+    }
+
+    #[inline(always)]
+    fn levels(&self, v: usize) -> (f32, f32) {
+        (self.values[v][1], self.values[v][2])
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "pixel coordinates are small")]
+fn narrow(value: f64) -> f32 {
+    value as f32
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "pixel coordinates are small and positive"
+)]
+fn ceil(value: f32) -> usize {
+    value.ceil() as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_filled_in_straight_lines_and_ends_go_on() {
+        let mut out = Vec::new();
+        let rough = [None, Some(2.0), None, None, Some(5.0), None];
+        assert!(fill(rough.into_iter(), &mut out));
+        assert_eq!(out, [2.0, 2.0, 3.0, 4.0, 5.0, 5.0]);
+        assert!(!fill([None, None].into_iter(), &mut out));
+    }
+
+    #[test]
+    fn a_line_stays_a_line_and_a_wild_value_goes() {
+        let mut line: Vec<f32> = (0..12u8).map(|k| 3.0 + 0.5 * f32::from(k)).collect();
+        let mut out = Vec::new();
+        smooth(&line, &mut out);
+        assert!(out.iter().zip(&line).all(|(a, b)| (a - b).abs() < 1e-5));
+        line[5] = 90.0;
+        median_of_three(&mut line);
+        assert_eq!(line[5], 6.0);
+    }
+}

@@ -1,0 +1,229 @@
+//! The gauge as rows of pixels across the bead.
+//!
+//! Gauge coordinates: `u` runs across the bead, `v` along it, both from the
+//! gauge's first pixel. A vertical bead has `u` along x; for a horizontal one
+//! `u` runs along y, so that its upper edge is the left one.
+
+use crate::frame::{Frame, Pixels};
+use crate::geometry::{ImagePoint, Roi};
+
+use super::gauge::Axis;
+
+/// Side of the squares in which a region is turned, so that both its reading
+/// and its writing stay in the cache.
+const TILE: usize = 16;
+
+/// The gauge laid over an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    roi: Roi,
+    axis: Axis,
+    /// Number of pixels across the bead.
+    pub across: usize,
+    /// Number of pixels along the bead.
+    pub along: usize,
+}
+
+impl View {
+    /// Lays a region over an image.
+    pub fn new(roi: Roi, axis: Axis) -> Self {
+        let (across, along) = match axis {
+            Axis::Vertical => (roi.width, roi.height),
+            Axis::Horizontal => (roi.height, roi.width),
+        };
+        Self { roi, axis, across, along }
+    }
+
+    /// The image point of gauge coordinates.
+    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+    pub fn to_image(self, u: f64, v: f64) -> ImagePoint {
+        let (x, y) = (self.roi.x as f64, self.roi.y as f64);
+        match self.axis {
+            Axis::Vertical => ImagePoint::new(x + u, y + v),
+            Axis::Horizontal => ImagePoint::new(x + v, y + u),
+        }
+    }
+}
+
+/// Grey values as the measurement takes them.
+pub trait Grey: Copy + Default + PartialOrd {
+    /// The value as a whole number.
+    fn level(self) -> u32;
+    /// The sum of four, without its lowest `shift` bits, which must fit 16.
+    fn sum_of_four(values: [Self; 4], shift: u32) -> u16;
+}
+
+impl Grey for u8 {
+    #[inline(always)]
+    fn level(self) -> u32 {
+        u32::from(self)
+    }
+
+    #[inline(always)]
+    fn sum_of_four([a, b, c, d]: [Self; 4], _: u32) -> u16 {
+        (u16::from(a) + u16::from(b)) + (u16::from(c) + u16::from(d))
+    }
+}
+
+impl Grey for u16 {
+    #[inline(always)]
+    fn level(self) -> u32 {
+        u32::from(self)
+    }
+
+    #[inline(always)]
+    fn sum_of_four([a, b, c, d]: [Self; 4], shift: u32) -> u16 {
+        let sum = (u32::from(a) + u32::from(b)) + (u32::from(c) + u32::from(d));
+        u16::try_from(sum >> shift).unwrap_or(u16::MAX)
+    }
+}
+
+/// The gauge's pixels, one row across the bead after the other.
+#[derive(Debug, Clone, Copy)]
+pub struct Strip<'a, T> {
+    values: &'a [T],
+    stride: usize,
+    /// Number of pixels across the bead.
+    pub across: usize,
+    /// Number of rows along it.
+    pub along: usize,
+    /// Upper end of the camera's scale.
+    pub white: T,
+    /// Grey levels of 256 for one step of the camera's scale.
+    pub scale: f32,
+}
+
+impl<'a, T: Grey> Strip<'a, T> {
+    /// One row across the bead.
+    #[inline(always)]
+    pub fn row(&self, v: usize) -> &'a [T] {
+        &self.values[v * self.stride..][..self.across]
+    }
+
+    /// Copies pixels of a row from `start` on; beyond its ends the last one is
+    /// repeated.
+    pub fn fetch(&self, v: usize, start: isize, out: &mut [T]) {
+        let row = self.row(v);
+        let last = self.across - 1;
+        for (value, place) in out.iter_mut().zip(start..) {
+            *value = row[usize::try_from(place).unwrap_or(0).min(last)];
+        }
+    }
+}
+
+/// Frames laid out in rows across the bead; keeps the memory for those of
+/// horizontal beads, which have to be turned.
+#[derive(Debug, Clone, Default)]
+pub struct Turner {
+    bytes: Vec<u8>,
+    words: Vec<u16>,
+}
+
+/// A strip of either depth.
+#[derive(Debug, Clone, Copy)]
+pub enum Strips<'a> {
+    /// Of 8 bits.
+    Bytes(Strip<'a, u8>),
+    /// Of 16 bits.
+    Words(Strip<'a, u16>),
+}
+
+impl Turner {
+    /// The gauge's rows in a frame in which it fits. `white` is the upper end
+    /// of the scale where it is not that of the pixels.
+    pub fn strips<'a>(
+        &'a mut self,
+        frame: &'a Frame,
+        view: &View,
+        white: Option<u16>,
+    ) -> Strips<'a> {
+        match frame.pixels() {
+            Pixels::Grey8(values) => {
+                let white = white.map_or(u8::MAX, |white| u8::try_from(white).unwrap_or(u8::MAX));
+                Strips::Bytes(lay(values, frame.width(), view, white, &mut self.bytes))
+            }
+            Pixels::Grey16(values) => {
+                let white = white.unwrap_or(u16::MAX);
+                Strips::Words(lay(values, frame.width(), view, white, &mut self.words))
+            }
+        }
+    }
+}
+
+fn lay<'a, T: Grey>(
+    values: &'a [T],
+    image_width: usize,
+    view: &View,
+    white: T,
+    memory: &'a mut Vec<T>,
+) -> Strip<'a, T> {
+    let first = view.roi.y * image_width + view.roi.x;
+    let (values, stride) = match view.axis {
+        Axis::Vertical => (&values[first..], image_width),
+        Axis::Horizontal => {
+            turn(&values[first..], image_width, view, memory);
+            (memory.as_slice(), view.across)
+        }
+    };
+    #[expect(clippy::cast_precision_loss, reason = "16 bits fit a float")]
+    let scale = 255.0 / white.level().max(1) as f32;
+    Strip { values, stride, across: view.across, along: view.along, white, scale }
+}
+
+/// Writes columns of the region as rows.
+fn turn<T: Grey>(values: &[T], image_width: usize, view: &View, memory: &mut Vec<T>) {
+    memory.resize(view.across * view.along, T::default());
+    for u_tile in (0..view.across).step_by(TILE) {
+        let u_end = (u_tile + TILE).min(view.across);
+        for v_tile in (0..view.along).step_by(TILE) {
+            let v_end = (v_tile + TILE).min(view.along);
+            for v in v_tile..v_end {
+                let row = &mut memory[v * view.across..][..view.across];
+                for u in u_tile..u_end {
+                    row[u] = values[u * image_width + v];
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::Stamp;
+
+    fn ramp() -> Frame {
+        let values = (0..20u8).flat_map(|y| (0..30u8).map(move |x| x * 4 + y)).collect();
+        Frame::new(0, Stamp::START, (30, 20), Pixels::Grey8(values)).unwrap()
+    }
+
+    const ROI: Roi = Roi { x: 5, y: 4, width: 21, height: 10 };
+
+    #[test]
+    fn a_horizontal_bead_is_a_vertical_one_on_its_side() {
+        let frame = ramp();
+        let mut turner = Turner::default();
+        for axis in [Axis::Vertical, Axis::Horizontal] {
+            let view = View::new(ROI, axis);
+            let Strips::Bytes(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
+            for (v, u) in (0..view.along).flat_map(|v| (0..view.across).map(move |u| (v, u))) {
+                #[expect(clippy::cast_precision_loss, reason = "a few pixels")]
+                let at = view.to_image(u as f64, v as f64);
+                assert_eq!(f64::from(strip.row(v)[u]), at.x * 4.0 + at.y, "{axis:?} {u} {v}");
+            }
+        }
+    }
+
+    #[test]
+    fn beyond_a_row_its_last_pixel_goes_on() {
+        let frame = ramp();
+        let mut turner = Turner::default();
+        let view = View::new(ROI, Axis::Vertical);
+        let Strips::Bytes(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
+        let mut out = [0; 4];
+        strip.fetch(0, -2, &mut out);
+        assert_eq!(out, [24, 24, 24, 28]);
+        strip.fetch(0, 19, &mut out);
+        assert_eq!(out, [100, 104, 104, 104]);
+    }
+}

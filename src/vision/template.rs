@@ -1,0 +1,339 @@
+//! What a blurred edge is in the pixels of a row, tabulated for places between
+//! two pixels, and with it what a row says of the edge.
+
+use nalgebra::Matrix3;
+
+use super::overlay::{Shape, offset, split};
+use super::step::StepTable;
+use super::strip::{Grey, Strip};
+
+/// Pixels that are taken together.
+const LANES: usize = 16;
+/// Places between two pixels for which the edge is tabulated.
+const PHASES: usize = 8;
+/// Chunks of the core at most: a blur of 12 px and more is cut short.
+const MAX_CORE: usize = 6;
+/// Chunks of the surroundings on either side at most.
+const MAX_PLAIN: usize = 3;
+const MAX_CHUNKS: usize = MAX_CORE + 2 * MAX_PLAIN;
+/// Half the core, in blurs and pixels beside.
+const CORE_BLURS: f64 = 3.5;
+const CORE_BESIDE_PX: f64 = 1.0;
+
+type Chunk = [f32; LANES];
+
+/// One chunk of pixels of the template.
+#[derive(Debug, Clone, Copy, Default)]
+struct Part {
+    /// Share of the step that is reached, with shading.
+    step: Chunk,
+    /// 1 where the pixel counts.
+    mask: Chunk,
+    /// The pure step's share, where the pixel counts.
+    after: Chunk,
+    /// Slope of the step \[1/px\], where the pixel counts.
+    slope: Chunk,
+}
+
+/// Sums of products of the core's columns, mean over the phases.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Products {
+    /// slope · slope.
+    pub slope_slope: f64,
+    /// slope · before.
+    pub slope_before: f64,
+    /// slope · after.
+    pub slope_after: f64,
+    /// before · before.
+    pub before_before: f64,
+    /// before · after.
+    pub before_after: f64,
+    /// after · after.
+    pub after_after: f64,
+    /// Pixels that count.
+    pub pixels: f64,
+}
+
+/// An edge of known blur and surroundings.
+#[derive(Debug, Clone)]
+pub struct Template {
+    parts: Vec<Part>,
+    chunks: usize,
+    core: std::ops::Range<usize>,
+    /// Sums over the core.
+    pub products: Products,
+}
+
+/// What a row says: how far it is from the levels and the place it was
+/// expected to have.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct RowSums {
+    /// Residual times the slope of the step.
+    pub slope: f32,
+    /// Sum of the squared residuals.
+    pub squares: f32,
+    /// Residual times the share before the edge.
+    pub before: f32,
+    /// Residual times the share after it.
+    pub after: f32,
+}
+
+/// Plain pixels that count and their residuals, over several rows, lane by
+/// lane.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PlainSums {
+    before: [Chunk; 2],
+    after: [Chunk; 2],
+}
+
+impl PlainSums {
+    /// Number of pixels before the edge and the sum of their residuals.
+    pub fn before(&self) -> (f32, f32) {
+        (total(&self.before[0]), total(&self.before[1]))
+    }
+
+    /// The same after it.
+    pub fn after(&self) -> (f32, f32) {
+        (total(&self.after[0]), total(&self.after[1]))
+    }
+}
+
+/// Place and levels that a row is held against.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Expected {
+    /// Position of the edge \[px\].
+    pub at: f32,
+    /// Level before it \[grey levels\].
+    pub before: f32,
+    /// Step to the level after it \[grey levels\].
+    pub step: f32,
+    /// Plain pixels farther from their level are grains or sparks
+    /// \[grey levels\].
+    pub tolerance: f32,
+}
+
+impl Default for Template {
+    fn default() -> Self {
+        Self {
+            parts: vec![Part::default(); PHASES * MAX_CHUNKS],
+            chunks: 0,
+            core: 0..0,
+            products: Products::default(),
+        }
+    }
+}
+
+impl Template {
+    /// Tabulates an edge.
+    pub fn tabulate(&mut self, table: &StepTable, shape: &Shape) {
+        let half = CORE_BLURS * shape.blur + CORE_BESIDE_PX;
+        let core = chunks(2.0 * half).clamp(1, MAX_CORE);
+        // A step that goes on beyond the core leaves nothing plain.
+        let plain = if 2.0 * half > float(MAX_CORE * LANES) { 0 } else { MAX_PLAIN };
+        let half = float(core * LANES / 2);
+        let before = chunks(shape.extent.before - half).min(plain);
+        let after = chunks(shape.extent.after - half).min(plain);
+        self.chunks = before + core + after;
+        self.core = before..before + core;
+        let mut products = Products::default();
+        for phase in 0..PHASES {
+            for chunk in 0..self.chunks {
+                let part = &mut self.parts[phase * MAX_CHUNKS + chunk];
+                let first = float(chunk * LANES) - float(before * LANES) - half;
+                let plain = !self.core.contains(&chunk);
+                fill(part, table, shape, first - offset(phase, PHASES), plain);
+                if !plain {
+                    products.add(part);
+                }
+            }
+        }
+        self.products = products.mean();
+    }
+
+    /// The place at which a row is sampled, which lies within a sixteenth of a
+    /// pixel of the one that was asked for \[px\].
+    #[inline(always)]
+    pub fn sampled(at: f32) -> f32 {
+        #[expect(clippy::cast_precision_loss, reason = "there are few phases")]
+        let phases = PHASES as f32;
+        let (place, phase) = split(at, PHASES);
+        #[expect(clippy::cast_precision_loss, reason = "a place near the gauge")]
+        let (place, phase) = (place as f32, phase as f32);
+        place + phase / phases
+    }
+
+    /// Holds a row against the edge.
+    #[inline(always)]
+    pub fn hold<T: Grey>(
+        &self,
+        strip: &Strip<'_, T>,
+        v: usize,
+        expected: &Expected,
+        plain: &mut PlainSums,
+    ) -> RowSums {
+        let (place, phase) = split(expected.at, PHASES);
+        let reach = (self.core.start * LANES + self.core.len() * LANES / 2).cast_signed();
+        let start = place - reach;
+        let length = self.chunks * LANES;
+        let parts = &self.parts[phase * MAX_CHUNKS..][..self.chunks];
+        let row = strip.row(v);
+        match usize::try_from(start).ok().and_then(|from| row.get(from..from + length)) {
+            Some(pixels) => self.sum(parts, pixels, strip.scale, expected, plain),
+            None => {
+                let mut pixels = [T::default(); MAX_CHUNKS * LANES];
+                strip.fetch(v, start, &mut pixels[..length]);
+                self.sum(parts, &pixels[..length], strip.scale, expected, plain)
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn sum<T: Grey>(
+        &self,
+        parts: &[Part],
+        pixels: &[T],
+        scale: f32,
+        expected: &Expected,
+        plain: &mut PlainSums,
+    ) -> RowSums {
+        let mut sums = RowSums::default();
+        let (before, rest) = parts.split_at(self.core.start);
+        let (core, after) = rest.split_at(self.core.len());
+        let (pixels_before, rest) = pixels.split_at(before.len() * LANES);
+        let (pixels_core, pixels_after) = rest.split_at(core.len() * LANES);
+        let mut lanes = [[0.0f32; LANES]; 4];
+        for (part, pixels) in core.iter().zip(pixels_core.chunks_exact(LANES)) {
+            for k in 0..LANES {
+                let miss = residual(part, k, pixels[k], scale, expected) * part.mask[k];
+                lanes[0][k] += miss * part.slope[k];
+                lanes[1][k] += miss * miss;
+                lanes[2][k] += miss;
+                lanes[3][k] += miss * part.after[k];
+            }
+        }
+        sums.slope = total(&lanes[0]);
+        sums.squares = total(&lanes[1]);
+        sums.after = total(&lanes[3]);
+        sums.before = total(&lanes[2]) - sums.after;
+        add_plain(before, pixels_before, scale, expected, &mut plain.before);
+        add_plain(after, pixels_after, scale, expected, &mut plain.after);
+        sums
+    }
+}
+
+#[inline(always)]
+fn add_plain<T: Grey>(
+    parts: &[Part],
+    pixels: &[T],
+    scale: f32,
+    expected: &Expected,
+    [count, sum]: &mut [Chunk; 2],
+) {
+    for (part, pixels) in parts.iter().zip(pixels.chunks_exact(LANES)) {
+        for k in 0..LANES {
+            let miss = residual(part, k, pixels[k], scale, expected);
+            let counts = if miss.abs() <= expected.tolerance { part.mask[k] } else { 0.0 };
+            count[k] += counts;
+            sum[k] += counts * miss;
+        }
+    }
+}
+
+#[inline(always)]
+fn residual<T: Grey>(part: &Part, k: usize, pixel: T, scale: f32, expected: &Expected) -> f32 {
+    #[expect(clippy::cast_precision_loss, reason = "16 bits fit a float")]
+    let level = pixel.level() as f32;
+    level * scale - expected.before - expected.step * part.step[k]
+}
+
+#[inline(always)]
+fn total(lanes: &Chunk) -> f32 {
+    let mut eight = [0.0f32; 8];
+    for k in 0..8 {
+        eight[k] = lanes[k] + lanes[k + 8];
+    }
+    let mut four = [0.0f32; 4];
+    for k in 0..4 {
+        four[k] = eight[k] + eight[k + 4];
+    }
+    (four[0] + four[2]) + (four[1] + four[3])
+}
+
+/// Fills a chunk whose first pixel lies at a distance from the edge.
+#[expect(clippy::cast_possible_truncation, reason = "shares and slopes of a step")]
+fn fill(part: &mut Part, table: &StepTable, shape: &Shape, first: f64, plain: bool) {
+    for k in 0..LANES {
+        let distance = first + float(k);
+        let z = distance / shape.blur;
+        let (step, density) = if plain { (f64::from(distance > 0.0), 0.0) } else { table.at(z) };
+        let depth_before = shape.blur * (density - z * (1.0 - step));
+        let depth_after = shape.blur * (density + z * step);
+        let shading = shape.shading.0 * depth_before + shape.shading.1 * depth_after;
+        let counts = distance >= -shape.extent.before && distance <= shape.extent.after;
+        let mask = f64::from(counts);
+        part.step[k] = (step + shading) as f32;
+        part.mask[k] = mask as f32;
+        part.after[k] = (mask * step) as f32;
+        part.slope[k] = (mask * density / shape.blur) as f32;
+    }
+}
+
+impl Products {
+    fn add(&mut self, part: &Part) {
+        for k in 0..LANES {
+            let [mask, after, slope] = [part.mask[k], part.after[k], part.slope[k]].map(f64::from);
+            let before = mask - after;
+            self.slope_slope += slope * slope;
+            self.slope_before += slope * before;
+            self.slope_after += slope * after;
+            self.before_before += before * before;
+            self.before_after += before * after;
+            self.after_after += after * after;
+            self.pixels += mask;
+        }
+    }
+
+    /// Normal equations of one row for the step times its shift, the level
+    /// before it and the level after it.
+    pub fn matrix(&self) -> Matrix3<f64> {
+        Matrix3::new(
+            self.slope_slope,
+            -self.slope_before,
+            -self.slope_after,
+            -self.slope_before,
+            self.before_before,
+            self.before_after,
+            -self.slope_after,
+            self.before_after,
+            self.after_after,
+        )
+    }
+
+    fn mean(self) -> Self {
+        let share = 1.0 / float(PHASES);
+        Self {
+            slope_slope: share * self.slope_slope,
+            slope_before: share * self.slope_before,
+            slope_after: share * self.slope_after,
+            before_before: share * self.before_before,
+            before_after: share * self.before_after,
+            after_after: share * self.after_after,
+            pixels: share * self.pixels,
+        }
+    }
+}
+
+/// Chunks that hold so many pixels.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "not negative, and a window is short"
+)]
+fn chunks(pixels: f64) -> usize {
+    (pixels.max(0.0) / float(LANES)).ceil() as usize
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a window is short")]
+fn float(number: usize) -> f64 {
+    number as f64
+}

@@ -1,0 +1,425 @@
+//! One edge of the bead, from rough places to sub-pixel ones with their
+//! variances: its profile is read from rows laid over each other, every row is
+//! held against it, and the rows of a band are solved for place and levels
+//! together.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::overlay::{Extent, Overlay, REACH, Shape};
+use super::path::{self, Rows};
+use super::pool::Bands;
+use super::step::StepTable;
+use super::strip::{Grey, Strip};
+use super::template::{Expected, PlainSums, RowSums, Template};
+
+/// Passes over the rows at most; a second one is made only where the first
+/// path was off by a good part of the blur.
+const MAX_PASSES: usize = 3;
+/// Share of the blur by which a path may be off.
+const NEAR_ENOUGH: f64 = 0.3;
+/// Standard deviations beyond which a pixel or a row is not noise.
+const MANY_SIGMA: f32 = 4.5;
+/// A row that fits worse than the median by so many times does not count.
+const UNLIKE: f32 = 2.5;
+/// Rows of a band may differ by this much beside their noise \[px\].
+const WAVY_PX: f32 = 0.5;
+/// Where levels are picked first: distance from the edge, and apart \[px\].
+const PICK: (f32, f32) = (5.0, 3.0);
+/// Extra deviation of levels that is believed, in standard deviations of its
+/// own doubt.
+const BELIEVED: f64 = 2.5;
+
+/// A caliper's edge with sub-pixel position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Located {
+    /// Position across the bead at the middle of the band \[px\].
+    pub at: f64,
+    /// Variance of the position \[px²\].
+    pub variance: f64,
+    /// Signed height of the step \[grey levels\].
+    pub height: f64,
+    /// Share of the band's rows that it comes from.
+    pub share: f64,
+}
+
+/// What is looked at.
+#[derive(Debug, Clone, Copy)]
+pub struct Scene<'a, T> {
+    /// The gauge's pixels.
+    pub strip: &'a Strip<'a, T>,
+    /// Its bands.
+    pub bands: &'a Bands,
+    /// Noise of a pixel \[grey levels\].
+    pub noise: f32,
+    /// Room between the two edges of the bead \[px\], at its narrowest.
+    pub width_px: f32,
+    /// Whether the bead lies after the edge.
+    pub bead_after: bool,
+}
+
+/// Traces one edge of the bead; keeps its memory from frame to frame.
+#[derive(Debug, Clone, Default)]
+pub struct Tracer {
+    rough: Vec<f32>,
+    path: Vec<f32>,
+    before: Vec<f32>,
+    step: Vec<f32>,
+    rows: Rows,
+    overlay: Overlay,
+    template: Template,
+    sums: Vec<(f32, RowSums)>,
+    plain: Vec<PlainSums>,
+    misfits: Vec<f32>,
+    sorted: Vec<f32>,
+    solved: Vec<BandSums>,
+    scatter: Vec<f64>,
+    edges: Vec<Option<Located>>,
+    /// Blur of the edge \[px\].
+    pub blur_px: f64,
+}
+
+/// Sums over the rows of a band that count.
+#[derive(Debug, Clone, Copy, Default)]
+struct BandSums {
+    rows: f64,
+    all_rows: f64,
+    step: f64,
+    vector: [f64; 3],
+    before: (f64, f64),
+    after: (f64, f64),
+}
+
+impl Tracer {
+    /// The edges of the last frame, band by band.
+    pub fn edges(&self) -> &[Option<Located>] {
+        &self.edges
+    }
+
+    /// The same, for those who sort out outliers.
+    pub fn edges_mut(&mut self) -> &mut [Option<Located>] {
+        &mut self.edges
+    }
+
+    /// Locates the edge from rough places, one a band. Returns whether there
+    /// is an edge at all.
+    #[inline(always)]
+    pub fn trace<T: Grey>(
+        &mut self,
+        table: &StepTable,
+        scene: &Scene<'_, T>,
+        rough: impl Iterator<Item = Option<f32>>,
+    ) -> bool {
+        self.edges.clear();
+        if !path::fill(rough, &mut self.rough) {
+            return false;
+        }
+        path::median_of_three(&mut self.rough);
+        path::smooth(&self.rough, &mut self.path);
+        self.pick_levels(scene);
+        self.rows.draw(scene.bands, &self.path, &self.before, &self.step);
+        self.overlay.lay(scene.strip, &self.rows);
+        let noise = f64::from(scene.noise) / f64::from(typical(&self.step).abs());
+        let Some(shape) = self.overlay.shape(table, noise, self.room(scene)) else {
+            return false;
+        };
+        let shape = self.adopt(shape);
+        self.blur_px = shape.blur;
+        self.template.tabulate(table, &shape);
+        for _ in 0..MAX_PASSES {
+            self.rows.draw(scene.bands, &self.path, &self.before, &self.step);
+            self.hold(scene);
+            self.gather(scene);
+            if self.locate(scene, shape.blur) {
+                break;
+            }
+        }
+        true
+    }
+
+    /// Levels on either side of the edge in every band, as the median of a few
+    /// places in its profile and of its neighbours.
+    fn pick_levels<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        self.before.clear();
+        self.step.clear();
+        let inside = 0.45 * scene.width_px;
+        let (room_before, room_after) =
+            if scene.bead_after { (f32::INFINITY, inside) } else { (inside, f32::INFINITY) };
+        for (band, &at) in self.path.iter().enumerate() {
+            let profile = scene.bands.profile(band);
+            let unit = scene.bands.unit();
+            let before = unit * level(profile, at, -1.0, room_before);
+            self.before.push(before);
+            self.step.push(unit * level(profile, at, 1.0, room_after) - before);
+        }
+        path::median_of_three(&mut self.before);
+        path::median_of_three(&mut self.step);
+        path::smooth(&self.before, &mut self.rough);
+        std::mem::swap(&mut self.before, &mut self.rough);
+        path::smooth(&self.step, &mut self.rough);
+        std::mem::swap(&mut self.step, &mut self.rough);
+        self.steady_steps();
+    }
+
+    /// Steps that are small or turned over against the others are not believed.
+    fn steady_steps(&mut self) {
+        self.sorted.clear();
+        self.sorted.extend_from_slice(&self.step);
+        let middle = self.sorted.len() / 2;
+        let typical = *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let typical = if typical.abs() < 1.0 { 1.0f32.copysign(typical) } else { typical };
+        for step in &mut self.step {
+            if *step / typical < 0.3 {
+                *step = 0.3 * typical;
+            }
+        }
+    }
+
+    /// How far there is nothing but this edge for certain: up to the gauge's
+    /// border and to the middle of the bead.
+    fn room<T: Grey>(&self, scene: &Scene<'_, T>) -> Extent {
+        let (low, high) =
+            self.path.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &at| {
+                (low.min(at), high.max(at))
+            });
+        #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+        let (across, reach) = (scene.strip.across as f32, REACH as f32 - 1.0);
+        let inside = 0.5 * scene.width_px;
+        let mut before = low.clamp(2.0, reach);
+        let mut after = (across - 1.0 - high).clamp(2.0, reach);
+        if scene.bead_after {
+            after = after.min(inside);
+        } else {
+            before = before.min(inside);
+        }
+        Extent { before: before.into(), after: after.into() }
+    }
+
+    /// Takes over what the overlay shows: the path is moved, and levels and
+    /// shading are those at the edge.
+    fn adopt(&mut self, shape: Shape) -> Shape {
+        let height = shape.after - shape.before;
+        for ((at, before), step) in self.path.iter_mut().zip(&mut self.before).zip(&mut self.step) {
+            *at += narrow(shape.at);
+            *before += narrow(shape.before) * *step;
+            *step *= narrow(height);
+        }
+        Shape {
+            at: 0.0,
+            before: 0.0,
+            after: 1.0,
+            shading: (shape.shading.0 / height, shape.shading.1 / height),
+            ..shape
+        }
+    }
+
+    /// Holds every row against the edge.
+    #[inline(always)]
+    fn hold<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        self.sums.clear();
+        self.plain.clear();
+        for band in 0..scene.bands.count() {
+            let (from, to) = scene.bands.rows(band);
+            let mut plain = PlainSums::default();
+            for v in from..to {
+                let [at, before, step] = self.rows.of(v);
+                let at = Template::sampled(at);
+                let tolerance = MANY_SIGMA * scene.noise + 0.05 * step.abs();
+                let expected = Expected { at, before, step, tolerance };
+                self.sums.push((at, self.template.hold(scene.strip, v, &expected, &mut plain)));
+            }
+            self.plain.push(plain);
+        }
+    }
+
+    /// Sums up the rows of each band, without those on which a grain or a
+    /// spark lies.
+    fn gather<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        let products = self.template.products;
+        let stiffness = narrow(products.slope_slope);
+        self.misfits.clear();
+        self.misfits.extend(
+            self.sums.iter().map(|(_, sums)| sums.squares - sums.slope * sums.slope / stiffness),
+        );
+        self.sorted.clear();
+        self.sorted.extend(self.misfits.iter().step_by(self.misfits.len().div_ceil(128)));
+        let middle = self.sorted.len() / 2;
+        let median = *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let pixels = narrow(products.pixels);
+        let noise = scene.noise * scene.noise * (pixels + MANY_SIGMA * (2.0 * pixels).sqrt());
+        let limit = noise.max(UNLIKE * median);
+        self.solved.clear();
+        for band in 0..scene.bands.count() {
+            let sums = self.gather_band(scene, band, limit, &products.matrix());
+            self.solved.push(sums);
+        }
+    }
+
+    fn gather_band<T: Grey>(
+        &mut self,
+        scene: &Scene<'_, T>,
+        band: usize,
+        limit: f32,
+        core: &Matrix3<f64>,
+    ) -> BandSums {
+        let stiffness = narrow(core[(0, 0)]);
+        let (from, to) = scene.bands.rows(band);
+        let step = self.step[band];
+        let moved = |v: usize| -> f32 {
+            let (at, sums) = &self.sums[v];
+            at - self.rows.of(v)[0] - sums.slope / (step * stiffness)
+        };
+        self.sorted.clear();
+        self.sorted.extend((from..to).filter(|&v| self.misfits[v] <= limit).map(moved));
+        let middle = self.sorted.len() / 2;
+        let typical = if self.sorted.is_empty() {
+            0.0
+        } else {
+            *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1
+        };
+        let far = MANY_SIGMA * scene.noise / (step.abs() * stiffness.sqrt()) + WAVY_PX;
+        let widen = |(count, sum): (f32, f32)| (f64::from(count), f64::from(sum));
+        let mut band_sums = BandSums {
+            step: step.into(),
+            all_rows: float(to - from),
+            before: widen(self.plain[band].before()),
+            after: widen(self.plain[band].after()),
+            ..BandSums::default()
+        };
+        for v in from..to {
+            if self.misfits[v] <= limit && (moved(v) - typical).abs() <= far {
+                let (at, sums) = &self.sums[v];
+                band_sums.add(sums, f64::from(at - self.rows.of(v)[0]), core);
+            }
+        }
+        band_sums
+    }
+
+    /// Solves every band; returns whether the path was near enough for that.
+    fn locate<T: Grey>(&mut self, scene: &Scene<'_, T>, blur: f64) -> bool {
+        let variance = f64::from(scene.noise).powi(2);
+        let core = self.template.products.matrix();
+        let extra = [0, 1].map(|side| self.extra_variance(core, variance, side));
+        self.edges.clear();
+        let mut off: f64 = 0.0;
+        for (band, sums) in self.solved.iter().enumerate() {
+            let located = sums.solve(core, variance, extra).map(|(moved, located)| {
+                let bent = moved / blur;
+                let moved = moved * (1.0 + bent * bent / 12.0);
+                off = off.max(moved.abs());
+                Located { at: f64::from(self.path[band]) + moved, ..located }
+            });
+            self.edges.push(located);
+        }
+        if off <= NEAR_ENOUGH * blur {
+            return true;
+        }
+        let places = self.edges.iter().map(|edge| edge.map(|edge| narrow(edge.at)));
+        path::fill(places, &mut self.rough);
+        path::median_of_three(&mut self.rough);
+        std::mem::swap(&mut self.path, &mut self.rough);
+        false
+    }
+
+    /// How much the level at the edge differs from that of the surroundings
+    /// from band to band beyond what noise explains: texture does that, and
+    /// then the surroundings say less. Robust, from the median.
+    fn extra_variance(&mut self, core: Matrix3<f64>, variance: f64, side: usize) -> f64 {
+        let Some(inverse) = core.try_inverse() else { return 0.0 };
+        self.scatter.clear();
+        let mut explained = 0.0;
+        for sums in &self.solved {
+            let (count, sum) = if side == 0 { sums.before } else { sums.after };
+            if sums.rows < 1.0 || count < 1.0 {
+                continue;
+            }
+            let at_edge = (inverse * Vector3::from(sums.vector))[side + 1] / sums.rows;
+            let off = at_edge - sum / count;
+            let expected = variance * (inverse[(side + 1, side + 1)] / sums.rows + 1.0 / count);
+            explained += expected;
+            self.scatter.push(off * off / expected);
+        }
+        if self.scatter.len() < 6 {
+            return 0.0;
+        }
+        let bands = float(self.scatter.len());
+        let middle = self.scatter.len() / 2;
+        // 0.455 is the median of the square of a standard normal number.
+        let ratio = *self.scatter.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.455;
+        let doubt = 2.3 / bands.sqrt();
+        if ratio < 1.0 + BELIEVED * doubt { 0.0 } else { (ratio - 1.0) * explained / bands }
+    }
+}
+
+impl BandSums {
+    /// `ahead` is how far the row was sampled beyond the path \[px\].
+    fn add(&mut self, sums: &RowSums, ahead: f64, core: &Matrix3<f64>) {
+        self.rows += 1.0;
+        // The unknown is the step times the distance from the path.
+        let ahead = self.step * ahead;
+        self.vector[0] += core[(0, 0)] * ahead - f64::from(sums.slope);
+        self.vector[1] += core[(1, 0)] * ahead + f64::from(sums.before);
+        self.vector[2] += core[(2, 0)] * ahead + f64::from(sums.after);
+    }
+
+    /// Place relative to the path and what is known of it; `None` without a
+    /// row or an edge.
+    fn solve(&self, core: Matrix3<f64>, variance: f64, extra: [f64; 2]) -> Option<(f64, Located)> {
+        if self.rows < 1.0 {
+            return None;
+        }
+        let mut matrix = core * self.rows;
+        let mut vector = Vector3::from(self.vector);
+        for (side, (count, sum)) in [self.before, self.after].into_iter().enumerate() {
+            if count >= 1.0 {
+                let weight = 1.0 / (1.0 / count + extra[side] / variance);
+                matrix[(side + 1, side + 1)] += weight;
+                vector[side + 1] += weight * sum / count;
+            }
+        }
+        let inverse = matrix.try_inverse()?;
+        let found = inverse * vector;
+        let height = self.step + found[2] - found[1];
+        let variance = variance * inverse[(0, 0)] / (self.step * self.step);
+        let share = self.rows / self.all_rows;
+        Some((found[0] / self.step, Located { at: 0.0, variance, height, share }))
+    }
+}
+
+/// Level at some distance from an edge: the median of five places.
+fn level(profile: &[u16], at: f32, sign: f32, room: f32) -> f32 {
+    let near = PICK.0.min(0.4 * room);
+    let apart = PICK.1.min((room - near) / 5.0);
+    let at_place = |k: f32| {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "saturates at 0 and is clamped to the profile"
+        )]
+        let place = (at + sign * (near + k * apart) + 0.5) as usize;
+        f32::from(profile[place.min(profile.len() - 1)])
+    };
+    median_of_five(at_place(0.0), at_place(1.0), at_place(2.0), at_place(3.0), at_place(4.0))
+}
+
+fn median_of_five(a: f32, b: f32, c: f32, d: f32, e: f32) -> f32 {
+    let (low, high) = (a.min(b).max(c.min(d)), a.max(b).min(c.max(d)));
+    // The extremes of the four are out; the fifth lies among the rest.
+    low.min(high).max(e.min(low.max(high)))
+}
+
+fn typical(values: &[f32]) -> f32 {
+    let sum: f32 = values.iter().sum();
+    #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
+    let count = values.len().max(1) as f32;
+    sum / count
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the quantity needs no more")]
+fn narrow(value: f64) -> f32 {
+    value as f32
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a count")]
+fn float(number: usize) -> f64 {
+    number as f64
+}
