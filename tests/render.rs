@@ -11,6 +11,7 @@ use truebead::calib::Calibration;
 use truebead::config::Cell;
 use truebead::config::cell::{CalibrationSource, Purpose};
 use truebead::io::calibration_file;
+use truebead::sim::picture::{Motion, Side, Spots};
 use truebead::sim::scenario::Series;
 use truebead::vision::Measurer;
 
@@ -142,4 +143,30 @@ fn a_folder_with_files_and_a_bad_scenario_are_refused_in_words() {
     let message = said(&mut render(&bad, &scratch.path().join("new"), &[]));
     assert!(message.contains("line 2") && message.contains("blur_px"), "{message}");
     assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 2, "nothing is left");
+}
+
+fn with_render(keys: &str) -> Result<Cell, String> {
+    let text = fs::read_to_string(folder("straight").join("scenario.toml")).unwrap();
+    let text = format!("{}\n[render]\n{keys}", text.split("[render]").next().unwrap());
+    Cell::parse(Path::new("scenario.toml"), &text, Purpose::Measure)
+        .map_err(|problems| problems.to_string())
+}
+
+#[test]
+fn disturbances_are_read_from_the_cell() {
+    let keys = "bead_grey = 300.0\nlight_deg = 90.0\nspot_share = 0.05\nspot_size_px = 5.0\n\
+                shading_side = \"both\"\nmotion_px = 6.0\nmotion_deg = 15.0\ncurve_radius_mm = -80.0\n\
+                grain_rows_share = 0.3\nshadow_px = 6.0\nneighbour_gap_px = 20.0\n\
+                texture_grey = 2.0\nbead_shading_grey_per_px = -1.0";
+    let picture = with_render(keys).unwrap().simulation.picture;
+    assert_eq!((picture.bead_grey, picture.light_deg), (300.0, Some(90.0)));
+    assert_eq!(picture.spots, Spots { share: 0.05, size_px: 5.0 });
+    assert_eq!(picture.motion, Motion { length_px: 6.0, direction_deg: 15.0 });
+    assert_eq!((picture.shading.side, picture.shading.bead_grey_per_px), (Side::Both, -1.0));
+    assert_eq!((picture.bend.radius_mm, picture.grains.rows_share), (-80.0, 0.3));
+    assert_eq!((picture.shadow.distance_px, picture.neighbour.gap_px), (6.0, 20.0));
+    assert_eq!(picture.texture.size_grey, 2.0);
+    let both = with_render("curve_radius_mm = 80.0\ncorner_deg = 20.0").unwrap_err();
+    assert!(both.contains("corner_deg"), "{both}");
+    assert!(with_render("bead_grey = 1001.0").is_err());
 }

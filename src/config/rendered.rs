@@ -6,7 +6,9 @@
 use super::table::Table;
 use crate::sim::bead::{BeadModel, Roughness};
 use crate::sim::disturbance::Flow;
-use crate::sim::picture::Picture;
+use crate::sim::picture::{
+    Bend, Grains, Motion, Neighbour, Picture, Shading, Shadow, Side, Spots, Texture,
+};
 use crate::time::Span;
 use crate::units::Mm;
 
@@ -123,28 +125,25 @@ fn read_flow(table: &Table<'_>) -> Option<Flow> {
 }
 
 fn read_picture(table: &Table<'_>) -> Option<Picture> {
-    let usual = Picture::default();
-    let size = if table.has("image_size_px") {
-        table.numbers::<2>("image_size_px", 16.0..=16_384.0)
-    } else {
-        Some(usual.size_px.map(f64::from))
-    };
-    let bead = table.number_or("bead_grey", 0.0..=255.0, usual.bead_grey);
-    let ground = table.number_or("ground_grey", 0.0..=255.0, usual.ground_grey);
+    let usual = Picture::USUAL;
+    let size_px = read_size(table);
+    let bead = table.number_or("bead_grey", 0.0..=1000.0, usual.bead_grey);
+    let ground = table.number_or("ground_grey", 0.0..=1000.0, usual.ground_grey);
     let blur = table.number_or("blur_px", 0.0..=20.0, usual.blur_px);
     let noise = table.number_or("noise_grey", 0.0..=100.0, usual.noise_grey);
     let light = table.number_or("light_ratio", 1.0..=20.0, usual.light_ratio);
     let slant = table.number_or("slant_deg", -20.0..=20.0, usual.slant_deg);
     let lateral = table.number_or("lateral_mm", -1e3..=1e3, usual.lateral_mm);
-    let height = table.optional_number("true_surface_height_mm", -1e4..=1e4);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "within 16..=16384 and rounded"
-    )]
-    let size_px = size?.map(|side| side.round() as u32);
+    // Every table is read before the first failure ends it, so that all
+    // violations are told.
+    let (bend, shading) = (read_bend(table), read_shading(table));
+    let (spots, grains) = (read_spots(table), read_grains(table));
+    let (shadow, neighbour) = (read_shadow(table), read_neighbour(table));
+    let (motion, texture) = (read_motion(table), read_texture(table));
     Some(Picture {
-        size_px,
+        light_deg: table.optional_number("light_deg", -360.0..=360.0),
+        true_surface_height_mm: table.optional_number("true_surface_height_mm", -1e4..=1e4),
+        size_px: size_px?,
         bead_grey: bead?,
         ground_grey: ground?,
         blur_px: blur?,
@@ -152,6 +151,105 @@ fn read_picture(table: &Table<'_>) -> Option<Picture> {
         light_ratio: light?,
         slant_deg: slant?,
         lateral_mm: lateral?,
-        true_surface_height_mm: height,
+        bend: bend?,
+        shading: shading?,
+        spots: spots?,
+        grains: grains?,
+        shadow: shadow?,
+        neighbour: neighbour?,
+        motion: motion?,
+        texture: texture?,
     })
+}
+
+fn read_size(table: &Table<'_>) -> Option<[u32; 2]> {
+    if !table.has("image_size_px") {
+        return Some(Picture::USUAL.size_px);
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "within 16..=16384 and rounded"
+    )]
+    let whole = |side: f64| side.round() as u32;
+    Some(table.numbers::<2>("image_size_px", 16.0..=16_384.0)?.map(whole))
+}
+
+const LEFT_FIRST: [(&str, Side); 3] =
+    [("left", Side::Left), ("right", Side::Right), ("both", Side::Both)];
+
+fn read_bend(table: &Table<'_>) -> Option<Bend> {
+    let usual = Picture::USUAL.bend;
+    let radius = table.number_or("curve_radius_mm", -1e6..=1e6, usual.radius_mm);
+    let corner = table.number_or("corner_deg", -90.0..=90.0, usual.corner_deg);
+    let bend = Bend { radius_mm: radius?, corner_deg: corner? };
+    if bend.radius_mm != 0.0 && bend.corner_deg != 0.0 {
+        table.report("corner_deg", "a corner of a curve", "either corner_deg or curve_radius_mm");
+        return None;
+    }
+    Some(bend)
+}
+
+fn read_shading(table: &Table<'_>) -> Option<Shading> {
+    let usual = Picture::USUAL.shading;
+    let slope = -100.0..=100.0;
+    let bead = table.number_or("bead_shading_grey_per_px", slope.clone(), usual.bead_grey_per_px);
+    let bead_px = table.number_or("bead_shading_px", 0.0..=1000.0, usual.bead_px);
+    let ground = table.number_or("ground_shading_grey_per_px", slope, usual.ground_grey_per_px);
+    let ground_px = table.number_or("ground_shading_px", 0.0..=1000.0, usual.ground_px);
+    let side = table.choice("shading_side", &LEFT_FIRST);
+    Some(Shading {
+        bead_grey_per_px: bead?,
+        bead_px: bead_px?,
+        ground_grey_per_px: ground?,
+        ground_px: ground_px?,
+        side: side?,
+    })
+}
+
+fn read_spots(table: &Table<'_>) -> Option<Spots> {
+    let usual = Picture::USUAL.spots;
+    let share = table.number_or("spot_share", 0.0..=0.9, usual.share);
+    let size = table.number_or("spot_size_px", 1.0..=200.0, usual.size_px);
+    Some(Spots { share: share?, size_px: size? })
+}
+
+fn read_grains(table: &Table<'_>) -> Option<Grains> {
+    let usual = Picture::USUAL.grains;
+    let share = table.number_or("grain_rows_share", 0.0..=0.9, usual.rows_share);
+    let size = table.number_or("grain_size_px", 1.0..=200.0, usual.size_px);
+    let grey = table.number_or("grain_grey", 0.0..=1000.0, usual.grey);
+    Some(Grains { rows_share: share?, size_px: size?, grey: grey? })
+}
+
+fn read_shadow(table: &Table<'_>) -> Option<Shadow> {
+    let usual = Picture::USUAL.shadow;
+    let distance = table.number_or("shadow_px", 0.0..=1000.0, usual.distance_px);
+    let width = table.number_or("shadow_width_px", 0.0..=1000.0, usual.width_px);
+    let share = table.number_or("shadow_share", 0.0..=2.0, usual.share);
+    let side = table.choice("shadow_side", &LEFT_FIRST);
+    Some(Shadow { distance_px: distance?, width_px: width?, share: share?, side: side? })
+}
+
+fn read_neighbour(table: &Table<'_>) -> Option<Neighbour> {
+    let usual = Picture::USUAL.neighbour;
+    let gap = table.number_or("neighbour_gap_px", 0.0..=1000.0, usual.gap_px);
+    let width = table.number_or("neighbour_width_px", 0.0..=10_000.0, usual.width_px);
+    let share = table.number_or("neighbour_share", 0.0..=2.0, usual.share);
+    let side = table.choice("neighbour_side", &LEFT_FIRST);
+    Some(Neighbour { gap_px: gap?, width_px: width?, share: share?, side: side? })
+}
+
+fn read_motion(table: &Table<'_>) -> Option<Motion> {
+    let usual = Picture::USUAL.motion;
+    let length = table.number_or("motion_px", 0.0..=100.0, usual.length_px);
+    let direction = table.number_or("motion_deg", -360.0..=360.0, usual.direction_deg);
+    Some(Motion { length_px: length?, direction_deg: direction? })
+}
+
+fn read_texture(table: &Table<'_>) -> Option<Texture> {
+    let usual = Picture::USUAL.texture;
+    let size = table.number_or("texture_grey", 0.0..=100.0, usual.size_grey);
+    let length = table.number_or("texture_px", 0.5..=50.0, usual.length_px);
+    Some(Texture { size_grey: size?, length_px: length? })
 }

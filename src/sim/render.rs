@@ -1,16 +1,20 @@
 //! Pictures of a bead, with their truth.
 
-use nalgebra::Vector2;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::hash;
+use super::bend::Bend;
+use super::contour::whole as float;
+use super::light::Light;
 use super::outline::{Bead, Outline};
 use super::picture::Picture;
-use super::shade;
+use super::seen::Seen;
+use super::shade::{self, Shape};
+use super::tint::Tint;
 use super::truth::{self, Truth};
 use super::view::View;
+use super::{grains, hash, motion, spots, texture};
 use crate::calib::Calibration;
 use crate::frame::{Frame, Pixels, WrongSize};
 use crate::geometry::ImagePoint;
@@ -18,14 +22,20 @@ use crate::time::Stamp;
 use crate::units::Mm;
 use crate::vision::{Axis, Gauge};
 
+/// What the random numbers of a frame are for; those of the noise have no word.
+const SPOTS: u64 = 1;
+const GRAINS: u64 = 2;
+const TEXTURE: u64 = 3;
+
 /// Takes pictures of a bead that runs through the gauge of a calibrated
 /// camera.
 ///
 /// The bead's edges are projected through the camera and its distortion; every
 /// pixel is the exact integral of the blurred edge's tangent over its area.
-/// Light, which falls off evenly from the lower right to the upper left corner
-/// and is 1 in the middle of the picture, multiplies the result, and noise is
-/// added before rounding. A frame depends on the seed and its number, not on
+/// Shading, shadows, spots and grains are added to that, blurred and moved like
+/// the edges. Light, which is 1 in the middle of the picture, multiplies the
+/// result; texture and noise are added before rounding, and what is above 255
+/// is saturated. A frame depends on the seed and its number, not on
 /// the frames before it. For the direction of travel see [`super::view`].
 #[derive(Debug, Clone)]
 pub struct Renderer {
@@ -115,11 +125,11 @@ impl Renderer {
         let view = self.view(robot_z)?;
         let (run, cross) = self.extent();
         // Half the picture across more, for edges that run at an angle.
-        let margin = shade::margin_px(self.picture.blur_px) + cross / 2;
-        let outline = Outline::trace(&view, bead, float(run), float(margin));
-        let shares = outline.as_ref().map(|outline| self.shares(outline, &view));
-        let light = self.light();
-        let pixels = self.expose(seq, shares.as_deref(), light);
+        let margin = float(shade::margin_px(self.picture.blur_px) + cross / 2);
+        let margin = margin + self.picture.motion.length_px;
+        let outline = Outline::trace(&view, bead, float(run), margin);
+        let seen = outline.as_ref().map(|outline| self.see(seq, outline, &view));
+        let pixels = self.expose(seq, seen.as_ref());
         let truth = outline.and_then(|outline| truth::of(&outline, &view, &self.gauge));
         let frame = Frame::new(seq, captured_at, self.size, Pixels::Grey8(pixels))?;
         Ok(Rendered { frame, truth })
@@ -142,6 +152,7 @@ impl Renderer {
         let map = self.calibration.surface(self.surface_height, robot_z);
         let Picture { slant_deg, lateral_mm, .. } = self.picture;
         View::new(map, &self.gauge, slant_deg, lateral_mm)
+            .map(|view| view.bent(Bend::new(&self.picture.bend)))
             .ok_or(RenderError::OffSurface { height_mm: self.surface_height.get() })
     }
 
@@ -154,54 +165,48 @@ impl Renderer {
         }
     }
 
-    /// Share of bead in every pixel, row by row.
-    fn shares(&self, outline: &Outline, view: &View) -> Vec<f32> {
-        let (width, height) = self.size;
-        let mut shares = vec![0.0; width * height];
-        let blur = self.picture.blur_px;
-        shade::shade(outline, view, self.extent(), blur, |at, first, line| match self.gauge.axis {
-            Axis::Vertical => {
-                let start = at * width + first;
-                shares[start..start + line.len()].copy_from_slice(line);
-            }
-            Axis::Horizontal => {
-                for (share, row) in line.iter().zip(first..) {
-                    shares[row * width + at] = *share;
-                }
-            }
-        });
-        shares
+    /// What a pixel sees of bead and ground, without light, texture and noise.
+    fn see(&self, seq: u64, outline: &Outline, view: &View) -> Seen {
+        let picture = &self.picture;
+        let shape = Shape::new(outline, view, self.extent(), picture.blur_px);
+        let places = motion::places(&picture.motion, picture.blur_px);
+        let mut seen = Seen::of(&shape, Tint::new(picture).as_ref(), &places);
+        let spots = spots::spots(&picture.spots, &shape, hash::mix(&[self.seed, seq, SPOTS]));
+        let grains = grains::grains(&picture.grains, &shape, hash::mix(&[self.seed, seq, GRAINS]));
+        if spots.is_some() || grains.is_some() {
+            let light = Light::new(picture, self.size);
+            let at = |run: usize, cross: usize| match self.gauge.axis {
+                Axis::Vertical => light.at(cross, run),
+                Axis::Horizontal => light.at(run, cross),
+            };
+            seen.cover(&shape, picture, (spots, grains), &at, &places);
+        }
+        match self.gauge.axis {
+            Axis::Vertical => seen,
+            Axis::Horizontal => seen.turned(self.extent().1),
+        }
     }
 
-    /// Light at the first pixel, and its growth to the right and downwards.
-    fn light(&self) -> (f64, Vector2<f64>) {
-        let ratio = self.picture.light_ratio.max(1.0);
-        let swing = (ratio - 1.0) / (ratio + 1.0);
-        let growth = |count: usize| swing / (float(count) - 1.0).max(1.0);
-        let growth = Vector2::new(growth(self.size.0), growth(self.size.1));
-        let middle = Vector2::new(float(self.size.0) - 1.0, float(self.size.1) - 1.0) / 2.0;
-        (1.0 - growth.dot(&middle), growth)
-    }
-
-    /// Grey levels from shares of bead, light and noise.
-    fn expose(
-        &self,
-        seq: u64,
-        shares: Option<&[f32]>,
-        (light, growth): (f64, Vector2<f64>),
-    ) -> Vec<u8> {
+    /// Grey levels from what is seen, light, texture and noise.
+    fn expose(&self, seq: u64, seen: Option<&Seen>) -> Vec<u8> {
         let Picture { bead_grey, ground_grey, noise_grey, .. } = self.picture;
         let step = bead_grey - ground_grey;
+        let light = Light::new(&self.picture, self.size);
+        let key = hash::mix(&[self.seed, seq, TEXTURE]);
+        let texture = texture::texture(&self.picture.texture, self.size, key);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(hash::mix(&[self.seed, seq]));
         let (width, height) = self.size;
         let mut pixels = Vec::with_capacity(width * height);
         for row in 0..height {
-            let shares = shares.and_then(|shares| shares.get(row * width..(row + 1) * width));
-            let row_light = light + growth.y * float(row);
+            let line = |values: &'_ [f32], column: usize| f64::from(values[row * width + column]);
+            let (first, growth) = light.row(row);
             for column in 0..width {
-                let share = shares.map_or(0.0, |shares| f64::from(shares[column]));
-                let lit = row_light + growth.x * float(column);
-                let mut grey = lit * (ground_grey + step * share);
+                let share = seen.map_or(0.0, |seen| line(&seen.shares, column));
+                let added = seen.and_then(|seen| seen.added.as_deref());
+                let added = added.map_or(0.0, |added| line(added, column));
+                let lit = first + growth * float(column);
+                let mut grey = lit * (ground_grey + step * share + added);
+                grey += texture.as_deref().map_or(0.0, |texture| line(texture, column));
                 if noise_grey > 0.0 {
                     let noise: f64 = StandardNormal.sample(&mut random);
                     grey += noise_grey * noise;
@@ -221,11 +226,6 @@ impl Renderer {
 )]
 fn rounded(grey: f64) -> u8 {
     (grey + 0.5) as u8
-}
-
-#[expect(clippy::cast_precision_loss, reason = "pixel numbers stay far below 2^53")]
-fn float(number: usize) -> f64 {
-    number as f64
 }
 
 #[cfg(test)]

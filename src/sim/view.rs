@@ -7,6 +7,7 @@
 
 use nalgebra::Vector2;
 
+use super::bend::Bend;
 use crate::calib::SurfaceMap;
 use crate::geometry::{ImagePoint, Roi, SurfacePoint};
 use crate::vision::{Axis, Gauge};
@@ -21,6 +22,7 @@ pub struct View {
     along: Vector2<f64>,
     across: Vector2<f64>,
     axis: Axis,
+    bend: Bend,
     /// Length along the bead of one pixel in the middle of the gauge \[mm\].
     pub pixel_mm: f64,
 }
@@ -53,18 +55,27 @@ impl View {
         let along = straight * cos + sideways * sin;
         let across = sideways * cos - straight * sin;
         let origin = map.to_mm(middle)? + across * lateral_mm;
-        Some(Self { map, origin, along, across, axis: gauge.axis, pixel_mm: ahead_mm.norm() })
+        let (axis, pixel_mm) = (gauge.axis, ahead_mm.norm());
+        Some(Self { map, origin, along, across, axis, bend: Bend::Straight, pixel_mm })
     }
 
-    /// The pixel of a place; `None` behind the camera.
+    /// The same where the bead's path bends about the middle of the gauge.
+    pub fn bent(self, bend: Bend) -> Self {
+        Self { bend, ..self }
+    }
+
+    /// The pixel of a place; `None` behind the camera, and too far around a
+    /// curve.
     pub fn px(&self, along_mm: f64, across_mm: f64) -> Option<Place> {
-        let px = self.map.to_px(self.origin + self.along * along_mm + self.across * across_mm)?;
+        let place = self.bend.place(along_mm, across_mm)?;
+        let px = self.map.to_px(self.origin + self.along * place.x + self.across * place.y)?;
         (px.x.is_finite() && px.y.is_finite()).then(|| self.place(px))
     }
 
     /// Distance of a pixel's place along the bead \[mm\].
     pub fn along_mm(&self, px: ImagePoint) -> Option<f64> {
-        Some((self.map.to_mm(px)? - self.origin).dot(&self.along))
+        let place = self.map.to_mm(px)? - self.origin;
+        Some(self.bend.along_mm(Vector2::new(place.dot(&self.along), place.dot(&self.across))))
     }
 
     fn place(&self, px: ImagePoint) -> Place {

@@ -5,6 +5,8 @@ use crate::calib::Camera;
 use crate::geometry::{Pose, Roi};
 use crate::vision::{Method, Polarity};
 
+mod disturbed;
+
 const PAPER_SCALE: f64 = 0.126_582;
 
 fn gauge(roi: Roi, axis: Axis) -> Gauge {
@@ -45,15 +47,19 @@ fn quiet() -> Picture {
     Picture { noise_grey: 0.0, light_ratio: 1.0, ..Picture::default() }
 }
 
-fn renderer(calibration: Calibration, gauge: Gauge, picture: Picture) -> Renderer {
-    Renderer::new(calibration, Mm::constant(20.0), gauge, picture, 5).unwrap()
+fn renderer(calibration: Calibration, gauge: Gauge, picture: &Picture) -> Renderer {
+    Renderer::new(calibration, Mm::constant(20.0), gauge, *picture, 5).unwrap()
 }
 
 fn shares(renderer: &Renderer, bead: &Bead<'_>) -> Vec<f32> {
+    seen(renderer, bead).shares
+}
+
+fn seen(renderer: &Renderer, bead: &Bead<'_>) -> Seen {
     let view = renderer.view(None).unwrap();
     let (run, cross) = renderer.extent();
     let outline = Outline::trace(&view, bead, float(run), float(cross)).unwrap();
-    renderer.shares(&outline, &view)
+    renderer.see(0, &outline, &view)
 }
 
 fn grey(frame: &Frame) -> Vec<f64> {
@@ -83,7 +89,7 @@ fn half_way(renderer: &Renderer, shares: &[f32], row: usize, rising: bool) -> f6
 fn every_row_holds_the_width_of_the_bead_in_pixels() {
     for (slant_deg, blur_px) in [(0.0, 1.5), (7.3, 1.5), (-19.0, 0.0), (12.0, 4.0), (3.0, 0.3)] {
         let picture = Picture { slant_deg, blur_px, lateral_mm: 1.234, ..quiet() };
-        let renderer = renderer(scale(), upright(), picture);
+        let renderer = renderer(scale(), upright(), &picture);
         let shares = shares(&renderer, &straight(30.0));
         let expected = 30.0 / PAPER_SCALE / slant_deg.to_radians().cos();
         for row in [60, 200, 333, 480] {
@@ -96,7 +102,7 @@ fn every_row_holds_the_width_of_the_bead_in_pixels() {
 #[test]
 fn pixels_far_from_the_edges_are_bead_or_ground_in_the_light_there() {
     let picture = Picture { noise_grey: 0.0, light_ratio: 1.5, ..Picture::default() };
-    let renderer = renderer(scale(), upright(), picture);
+    let renderer = renderer(scale(), upright(), &picture);
     let pixels = grey(&renderer.render(0, Stamp::START, None, &straight(40.0)).unwrap().frame);
     let light = |x: f64, y: f64| 1.0 + 0.2 * ((x - 359.5) / 719.0 + (y - 269.5) / 539.0);
     for (x, y, level) in [(0, 0, 70.0), (719, 539, 70.0), (360, 10, 150.0), (300, 500, 150.0)] {
@@ -117,7 +123,7 @@ fn truth_lies_where_the_picture_passes_half_way() {
     let odd = gauge(Roi { x: 40, y: 20, width: 640, height: 501 }, Axis::Vertical);
     for (calibration, slant_deg) in [(scale(), 0.0), (tilted(), 0.0), (tilted(), 9.0)] {
         let picture = Picture { slant_deg, lateral_mm: -0.7, ..quiet() };
-        let renderer = renderer(calibration, odd, picture);
+        let renderer = renderer(calibration, odd, &picture);
         let truth = renderer.render(0, Stamp::START, None, &wavy).unwrap().truth.unwrap();
         let shares = shares(&renderer, &wavy);
         assert_eq!((truth.left.y, truth.right.y), (270.0, 270.0));
@@ -130,7 +136,7 @@ fn truth_lies_where_the_picture_passes_half_way() {
 #[test]
 fn a_straight_bead_has_its_width_between_its_edges_on_the_surface() {
     let picture = Picture { slant_deg: 11.0, lateral_mm: 2.0, ..quiet() };
-    let renderer = renderer(tilted(), upright(), picture);
+    let renderer = renderer(tilted(), upright(), &picture);
     let bead = straight(37.0);
     let truth = renderer.render(0, Stamp::START, None, &bead).unwrap().truth.unwrap();
     assert!((truth.width_mm - 37.0).abs() < 1e-9);
@@ -158,7 +164,7 @@ fn a_surface_nearer_the_camera_looks_wider() {
     };
     let seen = |height: Option<f64>, robot_z: Option<f64>| {
         let picture = Picture { true_surface_height_mm: height, ..quiet() };
-        let rendered = renderer(down.clone(), upright(), picture)
+        let rendered = renderer(down.clone(), upright(), &picture)
             .render(0, Stamp::START, robot_z.map(Mm::constant), &straight(40.0))
             .unwrap();
         let truth = rendered.truth.unwrap();
@@ -176,8 +182,8 @@ fn a_horizontal_bead_is_a_vertical_one_turned() {
     let roi = Roi { x: 20, y: 20, width: 260, height: 260 };
     // To the right of the direction of travel in both.
     let leaning = |slant_deg| Picture { size_px, slant_deg, ..quiet() };
-    let up = shares(&renderer(scale(), gauge(roi, Axis::Vertical), leaning(-5.0)), &bead);
-    let right = shares(&renderer(scale(), gauge(roi, Axis::Horizontal), leaning(5.0)), &bead);
+    let up = shares(&renderer(scale(), gauge(roi, Axis::Vertical), &leaning(-5.0)), &bead);
+    let right = shares(&renderer(scale(), gauge(roi, Axis::Horizontal), &leaning(5.0)), &bead);
     for (row, column) in (0..300).flat_map(|row| (0..300).map(move |column| (row, column))) {
         let turned = up[(299 - column) * 300 + row];
         assert!((right[row * 300 + column] - turned).abs() < 1e-6);
@@ -189,7 +195,7 @@ fn a_bead_that_begins_in_the_picture_covers_its_own_area() {
     let begun = |s: f64| (s < 3.3).then_some((-12.0, 13.0));
     let picture = Picture { slant_deg: 6.0, size_px: [400, 300], ..quiet() };
     let roi = Roi { x: 20, y: 20, width: 360, height: 260 };
-    let renderer = renderer(scale(), gauge(roi, Axis::Vertical), picture);
+    let renderer = renderer(scale(), gauge(roi, Axis::Vertical), &picture);
     let at = |bead: &Bead<'_>| shares(&renderer, bead).iter().map(|s| f64::from(*s)).sum::<f64>();
     let later = |s: f64| (s < 5.3).then_some((-12.0, 13.0));
     let grown = (at(&later) - at(&begun)) * PAPER_SCALE * PAPER_SCALE;
@@ -200,7 +206,7 @@ fn a_bead_that_begins_in_the_picture_covers_its_own_area() {
 
 #[test]
 fn without_a_bead_there_is_ground() {
-    let renderer = renderer(tilted(), upright(), quiet());
+    let renderer = renderer(tilted(), upright(), &quiet());
     let rendered = renderer.render(0, Stamp::START, None, &|_| None).unwrap();
     assert!(rendered.frame.to_grey8().iter().all(|v| *v == 70));
     assert_eq!(rendered.truth, None);
@@ -209,7 +215,7 @@ fn without_a_bead_there_is_ground() {
 #[test]
 fn noise_is_of_the_size_that_was_asked_for_and_of_the_frame_alone() {
     let picture = Picture { light_ratio: 1.0, noise_grey: 4.0, ..Picture::default() };
-    let renderer = renderer(scale(), upright(), picture);
+    let renderer = renderer(scale(), upright(), &picture);
     let frame = |seq| renderer.render(seq, Stamp::START, None, &|_| None).unwrap().frame;
     let (first, second) = (frame(0), frame(1));
     assert_eq!(frame(0), first);
@@ -232,6 +238,6 @@ fn a_gauge_outside_the_picture_is_refused_in_words() {
 
 #[test]
 fn the_reach_is_half_the_picture() {
-    let reach = renderer(scale(), upright(), quiet()).reach_mm(None).unwrap();
+    let reach = renderer(scale(), upright(), &quiet()).reach_mm(None).unwrap();
     assert!((reach - 270.0 * PAPER_SCALE).abs() < 1e-9);
 }

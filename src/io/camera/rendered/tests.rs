@@ -31,14 +31,10 @@ const SMOOTH_STEADY: Simulation = Simulation {
     flow: Flow { step_at_mm: 0.0, step_ratio: 1.0, wave_share: 0.0, wavelength_mm: 1000.0 },
     picture: Picture {
         size_px: [160, 120],
-        bead_grey: 150.0,
-        ground_grey: 70.0,
         blur_px: 1.0,
         noise_grey: 0.0,
         light_ratio: 1.0,
-        slant_deg: 0.0,
-        lateral_mm: 0.0,
-        true_surface_height_mm: None,
+        ..Picture::USUAL
     },
 };
 

@@ -1,0 +1,54 @@
+//! How long a picture of 720 × 100 pixels takes with each disturbance.
+
+#![expect(clippy::expect_used, reason = "a benchmark of sound input")]
+
+use divan::Bencher;
+use truebead::calib::Calibration;
+use truebead::geometry::Roi;
+use truebead::sim::picture::{Motion, Picture};
+use truebead::sim::render::Renderer;
+use truebead::time::Stamp;
+use truebead::units::Mm;
+use truebead::vision::{Axis, Gauge, Method, Polarity};
+
+const USUAL: Picture = Picture { size_px: [720, 100], ..Picture::USUAL };
+
+const NAMES: [&str; 9] =
+    ["nothing", "shading", "shadow", "older bead", "spots", "grains", "motion", "texture", "curve"];
+
+fn disturbed(name: &str) -> Picture {
+    let mut picture = USUAL;
+    match name {
+        "shading" => picture.shading.bead_grey_per_px = 1.0,
+        "shadow" => picture.shadow.distance_px = 6.0,
+        "older bead" => picture.neighbour.gap_px = 20.0,
+        "spots" => picture.spots.share = 0.05,
+        "grains" => picture.grains.rows_share = 0.3,
+        "motion" => picture.motion = Motion { length_px: 6.0, direction_deg: 15.0 },
+        "texture" => picture.texture.size_grey = 2.0,
+        "curve" => picture.bend.radius_mm = 120.0,
+        _ => {}
+    }
+    picture
+}
+
+#[divan::bench(args = NAMES)]
+fn picture(bencher: Bencher<'_, '_>, name: &str) {
+    let gauge = Gauge {
+        roi: Roi { x: 40, y: 10, width: 640, height: 80 },
+        axis: Axis::Vertical,
+        polarity: Polarity::Bright,
+        width_range: (Mm::constant(20.0), Mm::constant(60.0)),
+        method: Method::Caliper,
+        calipers: 64,
+        min_contrast_grey: 6.0,
+    };
+    let scale = Calibration::Scale { mm_per_px: 0.126_582 };
+    let renderer = Renderer::new(scale, Mm::ZERO, gauge, disturbed(name), 1).expect("a sound cell");
+    let bead = |_: f64| Some((-21.0, 21.0));
+    bencher.bench_local(|| renderer.render(0, Stamp::START, None, &bead).expect("a picture"));
+}
+
+fn main() {
+    divan::main();
+}

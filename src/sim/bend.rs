@@ -1,0 +1,117 @@
+//! The path of a bead on the surface: straight, along an arc, or around a
+//! corner.
+
+use nalgebra::Vector2;
+
+use super::picture;
+
+/// Angle from the middle of the gauge beyond which an arc is not followed
+/// \[rad\]: its edges are functions of the place along the gauge's axis.
+const FARTHEST_RAD: f64 = 1.2;
+
+/// From distances along and across the bead to the directions ahead and to the
+/// right at the middle of the gauge, all in mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bend {
+    /// No bend.
+    Straight,
+    /// An arc of a signed radius \[mm\], to the right if positive.
+    Arc {
+        /// Radius of the middle line \[mm\].
+        radius_mm: f64,
+    },
+    /// A corner whose halves lie like mirror images about the line across.
+    Corner {
+        /// Sine and cosine of half the angle.
+        half: (f64, f64),
+    },
+}
+
+impl Bend {
+    /// As a picture asks for it.
+    pub fn new(asked: &picture::Bend) -> Self {
+        if asked.radius_mm != 0.0 {
+            Self::Arc { radius_mm: asked.radius_mm }
+        } else if asked.corner_deg != 0.0 {
+            Self::Corner { half: libm::sincos(0.5 * asked.corner_deg.to_radians()) }
+        } else {
+            Self::Straight
+        }
+    }
+
+    /// Where a place along and across the bead lies, ahead and to the right.
+    /// `across_mm` is normal to the bead's own axis. `None` too far around a
+    /// curve.
+    pub fn place(self, along_mm: f64, across_mm: f64) -> Option<Vector2<f64>> {
+        match self {
+            Self::Straight => Some(Vector2::new(along_mm, across_mm)),
+            Self::Arc { radius_mm } => {
+                let (sin, cos) = libm::sincos(along_mm / radius_mm);
+                let to_centre = radius_mm - across_mm;
+                let near = (along_mm / radius_mm).abs() < FARTHEST_RAD;
+                near.then(|| Vector2::new(to_centre * sin, radius_mm - to_centre * cos))
+            }
+            // Edges parallel to the two halves meet on the line across, where
+            // they are 1/cos as far apart as normal to a half.
+            Self::Corner { half: (sin, cos) } => {
+                Some(Vector2::new(along_mm * cos, along_mm.abs() * sin + across_mm / cos))
+            }
+        }
+    }
+
+    /// How far along the bead a place ahead and to the right lies \[mm\].
+    pub fn along_mm(self, place: Vector2<f64>) -> f64 {
+        match self {
+            Self::Straight => place.x,
+            Self::Arc { radius_mm } => {
+                let sign = radius_mm.signum();
+                radius_mm.abs() * libm::atan2(place.x, sign * (radius_mm - place.y))
+            }
+            Self::Corner { half: (_, cos) } => place.x / cos,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arc(radius_mm: f64) -> Bend {
+        Bend::new(&picture::Bend { radius_mm, corner_deg: 0.0 })
+    }
+
+    #[test]
+    fn an_arc_keeps_its_distance_from_its_centre() {
+        for radius_mm in [30.0, -30.0] {
+            let bend = arc(radius_mm);
+            let centre = Vector2::new(0.0, radius_mm);
+            for (along, across) in [(0.0, 0.0), (5.0, 4.0), (-11.0, 4.0), (20.0, -6.0)] {
+                let place = bend.place(along, across).unwrap();
+                let distance = (place - centre).norm();
+                // To the right is towards the centre of a curve to the right.
+                let expected = (radius_mm - across).abs();
+                assert!((distance - expected).abs() < 1e-12);
+                assert!((bend.along_mm(place) - along).abs() < 1e-12, "{along} {across}");
+            }
+            assert!(bend.place(10.0, 0.0).unwrap().y * radius_mm > 0.0);
+        }
+    }
+
+    #[test]
+    fn both_halves_of_a_corner_have_the_width_normal_to_themselves() {
+        let bend = Bend::new(&picture::Bend { radius_mm: 0.0, corner_deg: 40.0 });
+        for sign in [1.0, -1.0] {
+            let [a, b, c] = [(3.0, 2.0), (9.0, 2.0), (5.0, -2.0)]
+                .map(|(along, across)| bend.place(sign * along, across).unwrap());
+            let direction = (b - a).normalize();
+            assert!((direction.y / direction.x.abs() - 20_f64.to_radians().tan()).abs() < 1e-12);
+            let normal = Vector2::new(-direction.y, direction.x);
+            assert!(((c - a).dot(&normal).abs() - 4.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_circle_is_not_gone_around() {
+        assert!(arc(10.0).place(13.0, 0.0).is_none());
+    }
+}

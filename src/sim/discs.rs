@@ -1,0 +1,209 @@
+//! Discs that hide what is below them, on a grid of 4 × 4 points a pixel.
+
+use super::contour::{clamp, whole};
+use super::convolve::{convolve, kernel};
+use super::shade::Shape;
+
+/// Points along the side of a pixel.
+const FINE: usize = 4;
+
+/// A disc in pixels along and across the gauge's axis.
+#[derive(Debug, Clone, Copy)]
+pub struct Disc {
+    /// Along the axis.
+    pub run: f64,
+    /// Across it.
+    pub cross: f64,
+    /// Radius.
+    pub radius: f64,
+}
+
+/// The points that any disc covers; a bit each, line after line of pixels.
+#[derive(Debug, Clone)]
+pub struct Mask {
+    extent: (usize, usize),
+    bits: Vec<u16>,
+}
+
+/// What the discs hide, and how bright they are.
+#[derive(Debug)]
+pub struct Scene<'a> {
+    /// The bead.
+    pub shape: &'a Shape,
+    /// Grey of ground and bead, of 256.
+    pub grey: [f64; 2],
+    /// What shading adds to it, line after line.
+    pub tint: &'a [f32],
+}
+
+/// The discs of one grey level for each pixel, and whether only bead can have
+/// them.
+pub struct Layer<'a> {
+    /// Where.
+    pub mask: &'a Mask,
+    /// Grey of a disc in a pixel along and across the axis.
+    pub grey: &'a dyn Fn(usize, usize) -> f64,
+    /// Discs end where the bead ends.
+    pub bead_only: bool,
+}
+
+/// Where along a pixel a point lies, from the pixel's centre \[px\].
+fn point(number: usize) -> f64 {
+    (whole(number) + 0.5) / whole(FINE) - 0.5
+}
+
+impl Mask {
+    /// Without a disc.
+    pub fn new(extent: (usize, usize)) -> Self {
+        Self { extent, bits: vec![0; extent.0 * extent.1] }
+    }
+
+    /// Covers a disc.
+    pub fn cover(&mut self, disc: Disc) {
+        let Disc { run, cross, radius } = disc;
+        let range = |middle: f64, count: usize| {
+            clamp(middle - radius + 0.5, count)..clamp(middle + radius + 1.5, count)
+        };
+        for at in range(run, self.extent.0) {
+            for number in range(cross, self.extent.1) {
+                let (dv, du) = (whole(at) - run, whole(number) - cross);
+                let bits = &mut self.bits[at * self.extent.1 + number];
+                for i in 0..FINE * FINE {
+                    let (v, u) = (dv + point(i / FINE), du + point(i % FINE));
+                    *bits |= u16::from(v * v + u * u <= radius * radius) << i;
+                }
+            }
+        }
+    }
+
+    /// Uncovers what the other mask covers.
+    pub fn give_way(&mut self, other: &Self) {
+        for (bits, taken) in self.bits.iter_mut().zip(&other.bits) {
+            *bits &= !taken;
+        }
+    }
+
+    /// Share of all points that are covered.
+    #[cfg(test)]
+    pub fn share(&self) -> f64 {
+        let covered: u32 = self.bits.iter().map(|bits| bits.count_ones()).sum();
+        f64::from(covered) / whole(FINE * FINE * self.bits.len())
+    }
+}
+
+impl Scene<'_> {
+    /// Adds what a layer changes, before the blur, averaged over each pixel.
+    pub fn paint(&self, layer: &Layer<'_>, change: &mut [f32]) {
+        let cross = self.shape.extent.1;
+        for (at, line) in layer.mask.bits.chunks_exact(cross).enumerate() {
+            for (number, bits) in line.iter().enumerate().filter(|(_, bits)| **bits != 0) {
+                let [outside, inside] = self.split(*bits, at, number);
+                let [ground, bead] = self.grey;
+                let disc = (layer.grey)(at, number) - f64::from(self.tint[at * cross + number]);
+                let on_ground = if layer.bead_only { 0.0 } else { outside * (disc - ground) };
+                #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
+                let grey = (on_ground + inside * (disc - bead)) as f32;
+                change[at * cross + number] += grey;
+            }
+        }
+    }
+
+    /// Share of the pixel's covered points on ground and on bead.
+    fn split(&self, bits: u16, at: usize, number: usize) -> [f64; 2] {
+        let (mut outside, mut inside) = (0_u32, 0_u32);
+        let corners = [(-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5)];
+        let holds = |v: f64, u: f64| self.shape.holds(whole(at) + v, whole(number) + u);
+        let held = corners.into_iter().filter(|(v, u)| holds(*v, *u)).count();
+        match held {
+            0 => outside = bits.count_ones(),
+            4 => inside = bits.count_ones(),
+            _ => {
+                for i in (0..FINE * FINE).filter(|i| bits >> i & 1 == 1) {
+                    let inner = holds(point(i / FINE), point(i % FINE));
+                    *if inner { &mut inside } else { &mut outside } += 1;
+                }
+            }
+        }
+        [outside, inside].map(|count| f64::from(count) / whole(FINE * FINE))
+    }
+}
+
+/// Blurs what has changed as the lens does, and moves it like the rest of the
+/// picture.
+pub fn blur(
+    mut change: Vec<f32>,
+    width: usize,
+    blur_px: f64,
+    places: &[(f64, [f64; 2])],
+) -> Vec<f32> {
+    convolve(&mut change, width, &kernel(blur_px));
+    if let [(_, [0.0, 0.0])] = places {
+        return change;
+    }
+    let mut mean = vec![0.0; change.len()];
+    for (weight, [run, cross]) in places {
+        let (down, along) = (run.floor(), cross.floor());
+        let (v, u) = (run - down, cross - along);
+        let corners = [
+            ((0, 0), (1.0 - v) * (1.0 - u)),
+            ((0, 1), (1.0 - v) * u),
+            ((1, 0), v * (1.0 - u)),
+            ((1, 1), v * u),
+        ];
+        for ((lower, later), share) in corners {
+            #[expect(clippy::cast_possible_truncation, reason = "a weight, and a few pixels")]
+            let (share, by) =
+                ((weight * share) as f32, [down as isize + lower, along as isize + later]);
+            add_shifted(&mut mean, &change, width, by, share);
+        }
+    }
+    mean
+}
+
+/// Adds the values at `by` lines down and pixels to the right of each pixel.
+fn add_shifted(sum: &mut [f32], values: &[f32], width: usize, by: [isize; 2], weight: f32) {
+    let height = values.len() / width;
+    let (skip, drop) =
+        (by[1].min(0).unsigned_abs().min(width), by[1].max(0).unsigned_abs().min(width));
+    for (at, line) in sum.chunks_exact_mut(width).enumerate() {
+        let Some(from) = at.checked_add_signed(by[0]).filter(|from| *from < height) else {
+            continue;
+        };
+        let values = &values[from * width..][..width];
+        for (sum, value) in line[skip..width - drop].iter_mut().zip(&values[drop..width - skip]) {
+            *sum += weight * value;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_disc_covers_its_area_once() {
+        let mut mask = Mask::new((40, 50));
+        let disc = Disc { run: 20.3, cross: 24.8, radius: 9.0 };
+        mask.cover(disc);
+        mask.cover(disc);
+        let area = mask.share() * 2000.0;
+        assert!((area - 81.0 * std::f64::consts::PI).abs() < 1.5, "{area}");
+        mask.cover(Disc { run: -3.0, cross: 60.0, radius: 5.0 });
+        mask.give_way(&mask.clone());
+        assert_eq!(mask.share(), 0.0);
+    }
+
+    #[test]
+    fn moving_keeps_the_sum_and_shifts_the_middle() {
+        let mut values = vec![0.0; 30 * 20];
+        values[10 * 30 + 15] = 6.0;
+        let moved = blur(values, 30, 0.0, &[(0.5, [1.25, -2.5]), (0.5, [2.25, -2.5])]);
+        let moment = |of: &dyn Fn(f64, f64) -> f64| {
+            (0..600).map(|i| f64::from(moved[i]) * of(whole(i / 30), whole(i % 30))).sum::<f64>()
+        };
+        assert!((moment(&|_, _| 1.0) - 6.0).abs() < 1e-5);
+        // What a pixel sees through the shifted camera lies the other way.
+        assert!((moment(&|v, _| v) / 6.0 - (10.0 - 1.75)).abs() < 1e-5);
+        assert!((moment(&|_, u| u) / 6.0 - (15.0 + 2.5)).abs() < 1e-5);
+    }
+}

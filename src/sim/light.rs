@@ -1,0 +1,72 @@
+//! Light that grows evenly across the picture.
+
+use super::contour::whole;
+use super::picture::Picture;
+
+/// Light of every pixel; 1 in the middle of the picture.
+#[derive(Debug, Clone, Copy)]
+pub struct Light {
+    first: f64,
+    /// Growth from one pixel to the next, to the right and downwards.
+    growth: [f64; 2],
+}
+
+impl Light {
+    /// For a picture of so many columns and rows.
+    pub fn new(picture: &Picture, size: (usize, usize)) -> Self {
+        let ratio = picture.light_ratio.max(1.0);
+        let swing = (ratio - 1.0) / (ratio + 1.0);
+        let spans = [whole(size.0) - 1.0, whole(size.1) - 1.0];
+        let growth = match picture.light_deg {
+            None => spans.map(|span| swing / span.max(1.0)),
+            Some(direction) => {
+                let (sin, cos) = libm::sincos(direction.to_radians());
+                // From one end of the picture to the other in this direction.
+                let span = (cos * spans[0]).abs() + (sin * spans[1]).abs();
+                [cos, sin].map(|part| 2.0 * swing * part / span.max(1.0))
+            }
+        };
+        let middle = [spans[0] / 2.0, spans[1] / 2.0];
+        let first = 1.0 - (growth[0] * middle[0] + growth[1] * middle[1]);
+        Self { first, growth }
+    }
+
+    /// At a pixel.
+    pub fn at(&self, column: usize, row: usize) -> f64 {
+        let (first, growth) = self.row(row);
+        first + growth * whole(column)
+    }
+
+    /// At the first pixel of a row, and its growth along the row.
+    pub fn row(&self, row: usize) -> (f64, f64) {
+        (self.first + self.growth[1] * whole(row), self.growth[0])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(light_deg: Option<f64>, column: f64, row: usize) -> f64 {
+        let picture = Picture { light_ratio: 4.0, light_deg, ..Picture::USUAL };
+        let (first, growth) = Light::new(&picture, (101, 51)).row(row);
+        first + growth * column
+    }
+
+    #[test]
+    fn the_ratio_is_reached_from_end_to_end_in_any_direction() {
+        let ends = [
+            (None, (0.0, 0), (100.0, 50)),
+            (Some(0.0), (0.0, 0), (100.0, 0)),
+            (Some(90.0), (0.0, 0), (0.0, 50)),
+            (Some(180.0), (100.0, 0), (0.0, 0)),
+            (Some(-30.0), (0.0, 50), (100.0, 0)),
+        ];
+        for (direction, dim, bright) in ends {
+            let ratio = at(direction, bright.0, bright.1) / at(direction, dim.0, dim.1);
+            assert!((ratio - 4.0).abs() < 1e-12, "{direction:?}: {ratio}");
+            assert!((at(direction, 50.0, 25) - 1.0).abs() < 1e-12);
+        }
+        assert!((at(Some(0.0), 0.0, 0) - at(Some(0.0), 0.0, 50)).abs() < 1e-12);
+    }
+}

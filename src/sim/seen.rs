@@ -1,0 +1,86 @@
+//! What the pixels see before light, texture and noise: shares of bead, and
+//! the grey that disturbances add.
+
+use super::discs::{self, Layer, Mask, Scene};
+use super::picture::Picture;
+use super::shade::Shape;
+use super::tint::Tint;
+
+/// Pixels line after line across the bead, until they are turned.
+#[derive(Debug, Clone)]
+pub struct Seen {
+    /// Share of bead.
+    pub shares: Vec<f32>,
+    /// Grey levels that are added to bead and ground.
+    pub added: Option<Vec<f32>>,
+}
+
+impl Seen {
+    /// The bead and what follows its edges, as the mean over the places where
+    /// the picture is while the shutter is open.
+    pub fn of(shape: &Shape, tint: Option<&Tint>, places: &[(f64, [f64; 2])]) -> Self {
+        let (run, cross) = shape.extent;
+        let mut shares = vec![0.0; run * cross];
+        let mut added = tint.map(|_| vec![0.0; run * cross]);
+        let mut line = Vec::with_capacity(cross);
+        for (weight, shift) in places {
+            #[expect(clippy::cast_possible_truncation, reason = "a weight")]
+            let weight = *weight as f32;
+            for at in 0..run {
+                let Some(first) = shape.line(at, *shift, &mut line) else { continue };
+                let start = at * cross + first;
+                for (share, here) in shares[start..].iter_mut().zip(&line) {
+                    *share += weight * here;
+                }
+                if let Some((tint, added)) = tint.zip(added.as_mut()) {
+                    let greys = &mut added[at * cross..][..cross];
+                    tint.add(shape, (at, *shift), (first, &line), (weight, greys));
+                }
+            }
+        }
+        Self { shares, added }
+    }
+
+    /// Covers bead and ground with spots and grains. `light` is that of a
+    /// pixel along and across the axis.
+    pub fn cover(
+        &mut self,
+        shape: &Shape,
+        picture: &Picture,
+        (spots, grains): (Option<Mask>, Option<Mask>),
+        light: &dyn Fn(usize, usize) -> f64,
+        places: &[(f64, [f64; 2])],
+    ) {
+        let count = self.shares.len();
+        let tint = self.added.take().unwrap_or_else(|| vec![0.0; count]);
+        let grey = [picture.ground_grey, picture.bead_grey];
+        let scene = Scene { shape, grey, tint: &tint };
+        let mut change = vec![0.0; count];
+        if let Some(mut mask) = spots {
+            // Grains lie on top.
+            if let Some(grains) = &grains {
+                mask.give_way(grains);
+            }
+            // Saturated in any light.
+            let grey = |run, cross| picture.bead_grey.max(255.0 / light(run, cross));
+            scene.paint(&Layer { mask: &mask, grey: &grey, bead_only: true }, &mut change);
+        }
+        if let Some(mask) = &grains {
+            let grey = |_, _| picture.grains.grey;
+            scene.paint(&Layer { mask, grey: &grey, bead_only: false }, &mut change);
+        }
+        let mut added = discs::blur(change, shape.extent.1, shape.blur_px, places);
+        for (added, tint) in added.iter_mut().zip(tint) {
+            *added += tint;
+        }
+        self.added = Some(added);
+    }
+
+    /// Lines of `cross` pixels become columns.
+    pub fn turned(self, cross: usize) -> Self {
+        let turn = |values: Vec<f32>| -> Vec<f32> {
+            (0..cross).flat_map(|at| values.iter().skip(at).step_by(cross)).copied().collect()
+        };
+        Self { shares: turn(self.shares), added: self.added.map(turn) }
+    }
+}

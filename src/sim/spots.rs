@@ -1,0 +1,48 @@
+//! Specular spots on the bead.
+
+use std::f64::consts::PI;
+
+use rand::SeedableRng;
+use rand_distr::{Distribution, Poisson, StandardUniform};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::contour::whole;
+use super::discs::{Disc, Mask};
+use super::picture::Spots;
+use super::shade::Shape;
+
+/// Discs at random places over the bead. They may cover each other: of the
+/// area a, N discs leave the share exp(−N·πr²/a).
+pub fn spots(spots: &Spots, shape: &Shape, key: u64) -> Option<Mask> {
+    let radius = 0.5 * spots.size_px;
+    if spots.share <= 0.0 || radius <= 0.0 {
+        return None;
+    }
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(key);
+    let (from, to) = across(shape, radius);
+    let run = whole(shape.extent.0) + 2.0 * radius;
+    let density = -libm::log1p(-spots.share.min(0.99)) / (PI * radius * radius);
+    let count = Poisson::new(density * run * (to - from)).ok()?.sample(&mut random);
+    let mut mask = Mask::new(shape.extent);
+    let mut uniform = || -> f64 { StandardUniform.sample(&mut random) };
+    let mut drawn = 0.0;
+    while drawn < count {
+        drawn += 1.0;
+        let disc = Disc {
+            run: run * uniform() - radius - 0.5,
+            cross: from + (to - from) * uniform(),
+            radius,
+        };
+        mask.cover(disc);
+    }
+    Some(mask)
+}
+
+/// First and last place across the axis that a spot on the bead can have.
+fn across(shape: &Shape, radius: f64) -> (f64, f64) {
+    let crossings =
+        |edge: usize| (0..shape.extent.0).map(move |at| shape.edges[edge].crossing(whole(at)));
+    let from = crossings(0).fold(f64::INFINITY, f64::min) - radius;
+    let to = crossings(1).fold(f64::NEG_INFINITY, f64::max) + radius;
+    (from.max(-radius), to.min(whole(shape.extent.1) + radius))
+}

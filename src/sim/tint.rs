@@ -1,0 +1,186 @@
+//! Grey that follows an edge of the bead: light from one side, a shadow, an
+//! older bead beside it.
+
+use super::contour::{clamp, whole};
+use super::normal::{cumulative, first_integral};
+use super::picture::Picture;
+use super::shade::{REACH, Shape};
+
+/// Places of a profile for each pixel.
+const PER_PX: f64 = 16.0;
+
+/// Grey levels that are added at a distance from an edge; 0 on the near side.
+#[derive(Debug, Clone, Default)]
+struct Profile {
+    from_px: f64,
+    grey: Vec<f32>,
+}
+
+/// The grey that is added to bead and ground.
+#[derive(Debug, Clone)]
+pub struct Tint {
+    /// By the depth inside the edge; of the left and the right edge.
+    bead: [Profile; 2],
+    /// By the distance outside it.
+    ground: [Profile; 2],
+}
+
+/// A corner of a profile: from a distance on, a step and a change of slope.
+#[derive(Debug, Clone, Copy)]
+struct Knee {
+    at_px: f64,
+    step_grey: f64,
+    grey_per_px: f64,
+}
+
+impl Tint {
+    /// `None` where a picture has nothing of the kind.
+    pub fn new(picture: &Picture) -> Option<Self> {
+        // A pixel is itself a blur.
+        let blur_px = (picture.blur_px * picture.blur_px + 1.0 / 12.0).sqrt();
+        let shading = &picture.shading;
+        let shaded = shading.side.edges();
+        let bead = [0, 1].map(|edge| {
+            let slope = if shaded[edge] { shading.bead_grey_per_px } else { 0.0 };
+            Profile::new(&ramp(slope, shading.bead_px), blur_px)
+        });
+        let ground = [0, 1].map(|edge| Profile::new(&beside(picture, edge), blur_px));
+        let tint = Self { bead, ground };
+        tint.bead.iter().chain(&tint.ground).any(|p| !p.grey.is_empty()).then_some(tint)
+    }
+
+    /// Adds to the grey of one line across the bead, which has `shares` of
+    /// bead from the pixel `first` on.
+    pub fn add(
+        &self,
+        shape: &Shape,
+        (at, shift): (usize, [f64; 2]),
+        (first, shares): (usize, &[f32]),
+        (weight, greys): (f32, &mut [f32]),
+    ) {
+        let run = whole(at) + shift[0];
+        let middle = 0.5 * (shape.edges[0].crossing(run) + shape.edges[1].crossing(run)) - shift[1];
+        let middle = clamp(middle, greys.len());
+        let both = self.bead.iter().all(|profile| !profile.grey.is_empty());
+        for (edge, sign) in [(0, -1.0), (1, 1.0)] {
+            // The own half of the bead, and the other one up to its edge.
+            let (own, other) = if edge == 0 {
+                (0..middle, middle..greys.len())
+            } else {
+                (middle..greys.len(), 0..middle)
+            };
+            let outside = |number: usize| {
+                sign * shape.edges[edge].tangent(run, whole(number) + shift[1]).beyond
+            };
+            let (bead, ground) = (&self.bead[edge], &self.ground[edge]);
+            if !bead.grey.is_empty() || !ground.grey.is_empty() {
+                for number in own {
+                    let distance = outside(number);
+                    let grey = bead.at(-distance) + ground.at(distance);
+                    let laid = shape.laid_share(run, whole(number) + shift[1]);
+                    greys[number] += weight * laid * grey;
+                }
+            }
+            if !bead.grey.is_empty() && !both {
+                for number in other.start.max(first)..other.end.min(first + shares.len()) {
+                    greys[number] += weight * bead.at(-outside(number)) * shares[number - first];
+                }
+            }
+        }
+    }
+}
+
+/// What lies beside an edge.
+fn beside(picture: &Picture, edge: usize) -> Vec<Knee> {
+    let Picture { shading, shadow, neighbour, .. } = picture;
+    let contrast = picture.bead_grey - picture.ground_grey;
+    let mut knees = Vec::new();
+    if shading.side.edges()[edge] {
+        knees.extend(ramp(shading.ground_grey_per_px, shading.ground_px));
+    }
+    if shadow.distance_px > 0.0 && shadow.side.edges()[edge] {
+        knees.extend(band(shadow.distance_px, shadow.width_px, -shadow.share * contrast));
+    }
+    if neighbour.gap_px > 0.0 && neighbour.side.edges()[edge] {
+        knees.extend(band(neighbour.gap_px, neighbour.width_px, neighbour.share * contrast));
+    }
+    knees
+}
+
+fn ramp(grey_per_px: f64, length_px: f64) -> [Knee; 2] {
+    [(0.0, grey_per_px), (length_px, -grey_per_px)].map(|(at_px, grey_per_px)| Knee {
+        at_px,
+        step_grey: 0.0,
+        grey_per_px,
+    })
+}
+
+fn band(from_px: f64, width_px: f64, grey: f64) -> [Knee; 2] {
+    [(from_px, grey), (from_px + width_px, -grey)].map(|(at_px, step_grey)| Knee {
+        at_px,
+        step_grey,
+        grey_per_px: 0.0,
+    })
+}
+
+impl Profile {
+    /// Of a straight edge, blurred; empty where nothing is added.
+    fn new(knees: &[Knee], blur_px: f64) -> Self {
+        let real = |knee: &&Knee| knee.step_grey != 0.0 || knee.grey_per_px != 0.0;
+        let knees: Vec<&Knee> = knees.iter().filter(real).collect();
+        let first = knees.iter().map(|knee| knee.at_px).fold(f64::INFINITY, f64::min);
+        let last = knees.iter().map(|knee| knee.at_px).fold(f64::NEG_INFINITY, f64::max);
+        if knees.is_empty() {
+            return Self::default();
+        }
+        let from_px = first - REACH * blur_px;
+        let count = clamp((last + REACH * blur_px - from_px) * PER_PX + 2.0, 1 << 24);
+        let grey = (0..count).map(|number| {
+            let at = from_px + whole(number) / PER_PX;
+            let of = |knee: &&Knee| {
+                let u = (at - knee.at_px) / blur_px;
+                knee.step_grey * cumulative(u) + knee.grey_per_px * blur_px * first_integral(u)
+            };
+            #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
+            let grey = knees.iter().map(of).sum::<f64>() as f32;
+            grey
+        });
+        Self { from_px, grey: grey.collect() }
+    }
+
+    /// Straight between the places, constant beyond the last one.
+    fn at(&self, distance_px: f64) -> f32 {
+        let place = (distance_px - self.from_px) * PER_PX;
+        let Some(last) = self.grey.last().filter(|_| place > 0.0) else { return 0.0 };
+        let number = clamp(place, self.grey.len());
+        let Some([a, b]) = self.grey.get(number..number + 2) else { return *last };
+        #[expect(clippy::cast_possible_truncation, reason = "within 0 to 1")]
+        let share = (place - whole(number)) as f32;
+        a + (b - a) * share
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_blurred_ramp_is_a_ramp_away_from_its_corners() {
+        let profile = Profile::new(&ramp(2.0, 30.0), 1.5);
+        for (at, expected) in [(-9.0, 0.0), (15.0, 30.0), (22.3, 44.6), (60.0, 60.0)] {
+            assert!((f64::from(profile.at(at)) - expected).abs() < 1e-4, "{at}");
+        }
+        // s·φ(0) at the corner.
+        let corner = 2.0 * 1.5 / std::f64::consts::TAU.sqrt();
+        assert!((f64::from(profile.at(0.0)) - corner).abs() < 5e-3);
+    }
+
+    #[test]
+    fn a_blurred_band_is_half_way_at_its_edges() {
+        let profile = Profile::new(&band(6.0, 20.0, -56.0), 1.0);
+        for (at, expected) in [(0.0, 0.0), (6.0, -28.0), (16.0, -56.0), (26.0, -28.0), (40.0, 0.0)]
+        {
+            assert!((f64::from(profile.at(at)) - expected).abs() < 1e-3, "{at}");
+        }
+    }
+}
