@@ -7,6 +7,7 @@
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "help texts give units in brackets")]
 
+pub mod accuracy;
 pub mod calibrate;
 pub mod cell;
 pub mod check;
@@ -62,6 +63,7 @@ enum Command {
     RobotSim(robot_sim::RobotSimArgs),
     Replay(replay::ReplayArgs),
     Reproduce(reproduce::ReproduceArgs),
+    Accuracy(accuracy::AccuracyArgs),
     Check(check::CheckArgs),
 }
 
@@ -100,6 +102,7 @@ pub fn main() -> ExitCode {
         Command::RobotSim(args) => robot_sim::run(args).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(args, voice),
         Command::Replay(args) => replay::run(args),
+        Command::Accuracy(args) => accuracy::run(args, voice),
         Command::Check(args) => check::run(args),
     };
     done.unwrap_or_else(|error| {

@@ -5,6 +5,7 @@
 //! that hours of running cost as much memory as minutes. Every file appears
 //! under its final name only when it is whole.
 
+pub mod accuracy;
 pub mod log;
 pub mod names;
 pub mod output;

@@ -23,6 +23,11 @@ pub fn normal_pair(key: u64) -> [f64; 2] {
     [radius * cos, radius * sin]
 }
 
+/// A uniform number of a key, within 0..1, neither end included.
+pub fn unit(key: u64) -> f64 {
+    open_unit(finish(key))
+}
+
 /// Uniform within 0..1, neither end included.
 #[expect(clippy::cast_precision_loss, reason = "53 bits fit")]
 fn open_unit(word: u64) -> f64 {

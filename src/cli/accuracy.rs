@@ -1,0 +1,111 @@
+//! `truebead accuracy`: how well widths are measured in pictures whose truth is
+//! known.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::{Mutex, PoisonError};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use rayon::prelude::*;
+
+use super::{Voice, WrongArguments};
+use crate::offline::accuracy::{Outcome, SetFigures, markdown, table};
+use crate::offline::{Progress, output};
+use crate::sim::sets::{self, Set};
+use crate::sim::studio::Studio;
+use crate::vision::Measurer;
+
+/// Frames that one measurer measures after each other.
+const RUN: u64 = 50;
+
+/// Measures rendered sets of pictures and says how far off the widths are.
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Example:
+  truebead accuracy --set blur-1.5 --set grains-6-dark --out accuracy
+
+Every set is rendered and measured like the frames of a cell with defaults.
+Silent: widths that are more than half a pixel off, as a share of all frames.
+Bound: the smallest standard deviation that a width can have in a picture that
+nothing disturbs. The status is 1 where a set with limits misses them.")]
+pub struct AccuracyArgs {
+    /// Frames of each set that nothing disturbs
+    #[arg(long, value_name = "N", default_value = "3000", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    frames: u64,
+    /// Frames of each disturbed set
+    #[arg(long, value_name = "M", default_value = "30000", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    silent_frames: u64,
+    /// Only this set; may be given more than once
+    #[arg(long = "set", value_name = "NAME")]
+    sets: Vec<String>,
+    /// Folder for accuracy.json and accuracy.md
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+/// Runs the command.
+pub fn run(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
+    let sets = chosen(&args.sets)?;
+    if let Some(out) = &args.out {
+        output::make_folder(out)?;
+    }
+    let count = |set: &Set| if set.disturbed { args.silent_frames } else { args.frames };
+    let total = sets.iter().map(count).sum();
+    let progress = Mutex::new(Progress::new("measuring", "frames", Some(total), voice.quiet));
+    let figures: Result<Vec<SetFigures>> =
+        sets.iter().map(|set| judge(set, count(set), &progress)).collect();
+    progress.into_inner().unwrap_or_else(PoisonError::into_inner).finish();
+    let figures = figures?;
+    if let Some(out) = &args.out {
+        let json = serde_json::to_vec_pretty(&figures).context("accuracy.json")?;
+        output::write_whole(out, "accuracy.json", &json)?;
+        output::write_whole(out, "accuracy.md", markdown(&figures).as_bytes())?;
+    }
+    print!("{}", table(&figures));
+    let missed = figures.iter().any(|figures| figures.kept == Some(false));
+    Ok(if missed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// The named sets, or all.
+fn chosen(names: &[String]) -> Result<Vec<Set>> {
+    let all = sets::all();
+    if let Some(unknown) = names.iter().find(|name| all.iter().all(|set| set.name != **name)) {
+        let known: Vec<&str> = all.iter().map(|set| set.name).collect();
+        let what = format!("--set {unknown}: there is none; one of {}", known.join(", "));
+        return Err(WrongArguments::new(what).into());
+    }
+    let wanted = |set: &Set| names.is_empty() || names.iter().any(|name| name == set.name);
+    Ok(all.into_iter().filter(wanted).collect())
+}
+
+/// Renders and measures the frames of a set. Which measurer measures which
+/// frames does not depend on the machine.
+fn judge(set: &Set, frames: u64, progress: &Mutex<Progress>) -> Result<SetFigures> {
+    let studio = Studio::new(set)?;
+    let runs: Result<Vec<Vec<Option<Outcome>>>> = (0..frames.div_ceil(RUN))
+        .into_par_iter()
+        .map(|run| {
+            let mut measurer = Measurer::new(studio.gauge(), None);
+            (run * RUN..frames.min((run + 1) * RUN))
+                .map(|frame| {
+                    let outcome = measure(&studio, &mut measurer, frame);
+                    progress.lock().unwrap_or_else(PoisonError::into_inner).advance();
+                    outcome
+                })
+                .collect()
+        })
+        .collect();
+    Ok(SetFigures::of(set, studio.mm_per_px(), &runs?.concat()))
+}
+
+/// `None` for a frame that is refused.
+fn measure(studio: &Studio, measurer: &mut Measurer, frame: u64) -> Result<Option<Outcome>> {
+    let rendered = studio.take(frame)?;
+    let truth = rendered.truth.context("a bead that runs through its gauge has a truth")?;
+    let found = measurer.measure(&rendered.frame, studio.surface()).ok();
+    Ok(found.map(|found| Outcome {
+        error_mm: found.width.get() - truth.width_mm,
+        sigma_mm: found.sigma.get(),
+    }))
+}

@@ -1,0 +1,57 @@
+//! `truebead accuracy` on a few frames: that every set can be measured, and
+//! that what nothing disturbs is measured well.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail")]
+
+use std::fs;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+fn accuracy(args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_truebead"));
+    command.arg("accuracy").args(args);
+    command
+}
+
+#[test]
+fn every_set_is_measured_and_the_undisturbed_ones_well() {
+    let out = tempfile::tempdir().unwrap();
+    let folder = out.path().to_str().unwrap();
+    let args = ["--frames", "60", "--silent-frames", "30", "--out", folder];
+    // A verdict on so few frames may be either.
+    let status = accuracy(&args).output().unwrap().status.code();
+    assert!(matches!(status, Some(0 | 1)), "{status:?}");
+    let json = fs::read(out.path().join("accuracy.json")).unwrap();
+    let figures: Vec<Value> = serde_json::from_slice(&json).unwrap();
+    let lines = fs::read_to_string(out.path().join("accuracy.md")).unwrap();
+    assert_eq!(lines.lines().count(), figures.len() + 2);
+    for figures in &figures {
+        let number = |key: &str| figures[key].as_f64().unwrap();
+        let set = figures["set"].as_str().unwrap();
+        let clear = ["blur", "slant", "rough", "tilted"];
+        if set == "faint" {
+            assert!(number("measured_share") > 0.5 && number("rmse_px") < 1.0, "{figures}");
+        } else if clear.iter().any(|name| set.starts_with(name)) {
+            assert_eq!((number("frames"), number("measured_share")), (60.0, 1.0), "{set}");
+            assert_eq!(number("silent_share"), 0.0, "{set}");
+            assert!(number("rmse_px") < 0.1 && number("bias_px").abs() < 0.05, "{figures}");
+            assert!(number("rms_over_sigma") < 3.0, "{figures}");
+        } else {
+            assert_eq!(number("frames"), 30.0, "{set}");
+        }
+    }
+}
+
+#[test]
+fn figures_are_the_same_every_time() {
+    let run = || accuracy(&["--set", "spots", "--silent-frames", "60"]).output().unwrap().stdout;
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn a_set_that_is_not_there_is_refused_with_those_that_are() {
+    let output = accuracy(&["--set", "blurr"]).assert().code(2).get_output().clone();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("blurr") && said.contains("grains-6-dark"), "{said}");
+}
