@@ -15,6 +15,8 @@
 //! baseline.
 
 mod axis;
+mod contour;
+mod curve;
 mod edge;
 mod edge_lines;
 pub mod gauge;
@@ -26,6 +28,7 @@ mod pair;
 mod path;
 mod pool;
 pub mod reject;
+mod scatter;
 mod step;
 mod strip;
 mod template;

@@ -1,15 +1,17 @@
-//! From edges in pixels to a width on the surface: the bead's axis is fitted
-//! to the middles in millimetres, and each caliper's width is taken normal to
-//! it.
+//! From edges in pixels to a width on the surface: the course of each edge
+//! along the gauge is taken to the surface, and widths are taken there normal
+//! to the line midway between the two, which is the bead's local axis.
 
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::Vector2;
 
 use crate::calib::SurfaceMap;
-use crate::geometry::{ImagePoint, SurfacePoint};
+use crate::geometry::SurfacePoint;
 use crate::units::Mm;
 
+use super::curve::{Curve, Point};
 use super::gauge::Gauge;
 use super::reject::Reject;
+use super::scatter;
 use super::strip::View;
 use super::trace::Located;
 use super::width::{Hints, WidthMeasurement};
@@ -17,303 +19,364 @@ use super::width::{Hints, WidthMeasurement};
 /// Largest angle between the bead and the gauge's axis that is measured: the
 /// 20 degrees of the contract and a little for the measurement's own noise.
 const MAX_SLANT_RAD: f64 = 0.38;
+/// The same at the ends of the gauge, where a bent bead is steeper and a
+/// corner shows as one that is steeper still.
+const MAX_END_SLANT_RAD: f64 = 0.44;
+/// Smallest radius of a bead's axis in its widths: what bends more sharply is
+/// a corner.
+const LEAST_RADIUS: f64 = 1.5;
 /// Share of the gauge on either side of its middle from which the edge points
 /// there are taken.
 const MIDDLE_SHARE: f64 = 0.125;
+/// Places and weights of the Gauss–Legendre rule by which the mean over the
+/// gauge is taken.
+const NODES: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.236_926_885_056_189),
+    (-0.538_469_310_105_683, 0.478_628_670_499_366),
+    (0.0, 0.568_888_888_888_889),
+    (0.538_469_310_105_683, 0.478_628_670_499_366),
+    (0.906_179_845_938_664, 0.236_926_885_056_189),
+];
+/// Distance of the places from which an edge's direction and bend on the
+/// surface are taken.
+const BESIDE: f64 = 0.15;
 
-/// The two edges of one caliper line.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Caliper {
-    /// Position along the bead \[px\].
-    pub along: f64,
-    /// Left edge.
-    pub left: Located,
-    /// Right edge.
-    pub right: Located,
+/// One edge as it was found.
+#[derive(Debug, Clone, Copy)]
+pub struct Side<'a> {
+    /// Its places, band by band.
+    pub places: &'a [Option<Located>],
+    /// Variance of the whole edge's position that all places share \[px²\].
+    pub common_variance: f64,
 }
 
-/// Width of the bead from its calipers, of which there could be `expected`.
-/// `memory` is scratch.
+/// What a width is taken from.
+#[derive(Debug, Clone, Copy)]
+pub struct Scene<'a> {
+    /// The gauge over the image.
+    pub view: &'a View,
+    /// From pixels to millimetres.
+    pub surface: &'a SurfaceMap,
+    /// What is expected.
+    pub gauge: &'a Gauge,
+    /// Middles of the bands along the bead \[px\].
+    pub middles: &'a [f64],
+    /// Left and right edge.
+    pub sides: [Side<'a>; 2],
+}
+
+/// Memory that is kept from frame to frame.
+#[derive(Debug, Clone, Default)]
+pub struct Memory {
+    off: [Vec<Option<f64>>; 2],
+    values: Vec<f64>,
+}
+
+/// Width of the bead.
 pub fn width(
-    (calipers, expected): (&[Caliper], usize),
-    view: &View,
-    surface: &SurfaceMap,
-    gauge: &Gauge,
+    scene: &Scene<'_>,
     hints: Hints,
-    memory: &mut Vec<f64>,
+    memory: &mut Memory,
 ) -> Result<WidthMeasurement, Reject> {
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    let (centre, reach) = ((view.along - 1) as f64 / 2.0, view.along as f64 / 2.0);
-    let place = |along: f64| (along - centre) / reach;
-    let slant_rad = slant(calipers, &place, reach)?;
-    let axis = Midline::fit(calipers, &place, view, surface, memory)?;
-    let mut sums = Sums { tilt_variance: axis.tilt_variance, ..Sums::default() };
-    for caliper in calipers {
-        let normal = axis.normal(place(caliper.along)).ok_or(Reject::OffSurface)?;
-        let (left, right) = points(caliper, view, surface)?;
-        sums.add(right - left, normal, caliper);
+    let failed = Reject::NoPair { got: 0.0, need: 0.0 };
+    let curve = |side: usize| Curve::fit(scene.points(side)).ok_or(failed);
+    let curves = [curve(0)?, curve(1)?];
+    let slant_rad = scene.slant(&curves)?;
+    let sections = Sections::cut(scene, &curves).ok_or(Reject::OffSurface)?;
+    scene.check_width(sections.mean)?;
+    for side in 0..2 {
+        scene.lay_off(side, &curves[side], &mut memory.off[side]);
     }
-    let middle_normal = axis.normal(0.0).ok_or(Reject::OffSurface)?;
-    let left = edge_at_middle(calipers, &place, |caliper| caliper.left.at);
-    let right = edge_at_middle(calipers, &place, |caliper| caliper.right.at);
-    let (left, right) = (view.to_image(left, centre), view.to_image(right, centre));
-    let across = view.to_image(1.0, 0.0) - view.to_image(0.0, 0.0);
-    let scale_left = scale(surface, left, across, middle_normal).ok_or(Reject::OffSurface)?;
-    let scale_right = scale(surface, right, across, middle_normal).ok_or(Reject::OffSurface)?;
-    let result = sums.finish((scale_left, scale_right), expected);
-    let (min, max) = gauge.width_range;
-    if !(min.get()..=max.get()).contains(&result.mean) {
-        return Err(Reject::WidthOutOfRange {
-            got_mm: result.mean,
-            min_mm: min.get(),
-            max_mm: max.get(),
-        });
-    }
+    let spread = Spread::of(scene, &curves, &sections, memory);
+    let edge = |side: usize| {
+        let at = curves[side].at(0.0) + scene.off_at_middle(&memory.off[side]);
+        scene.view.to_image(at, scene.centre())
+    };
     let finite = |value: f64| Mm::new(value).map_err(|_| Reject::OffSurface);
     Ok(WidthMeasurement {
-        width: finite(result.mean)?,
-        sigma: finite(result.sigma)?,
-        roughness: finite(result.roughness)?,
-        left,
-        right,
+        width: finite(sections.mean)?,
+        sigma: finite(spread.sigma)?,
+        roughness: finite(spread.roughness)?,
+        left: edge(0),
+        right: edge(1),
         slant_rad,
-        hints: Hints { used_share: result.used_share, ..hints },
+        hints,
     })
 }
 
-/// Running sums over the calipers.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    n: f64,
-    mean: f64,
-    squares: f64,
-    variance_left: f64,
-    variance_right: f64,
-    /// Mean of the part of the caliper lines that runs along the bead.
-    oblique: f64,
-    /// Variance of the axis' direction \[rad²\].
-    tilt_variance: f64,
-}
-
-struct Averaged {
-    mean: f64,
-    sigma: f64,
-    roughness: f64,
-    used_share: f64,
-}
-
-impl Sums {
-    /// Welford's update, so that a small scatter of wide beads is not lost.
-    fn add(&mut self, across: Vector2<f64>, normal: Vector2<f64>, caliper: &Caliper) {
-        let width = across.dot(&normal).abs();
-        self.n += 1.0;
-        self.oblique += (across.perp(&normal) - self.oblique) / self.n;
-        let off = width - self.mean;
-        self.mean += off / self.n;
-        self.squares += off * (width - self.mean);
-        self.variance_left += caliper.left.variance;
-        self.variance_right += caliper.right.variance;
+impl Scene<'_> {
+    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+    fn centre(&self) -> f64 {
+        (self.view.along - 1) as f64 / 2.0
     }
 
-    fn finish(&self, (scale_left, scale_right): (f64, f64), expected: usize) -> Averaged {
-        let noise = scale_left * scale_left * self.variance_left
-            + scale_right * scale_right * self.variance_right;
-        let scatter = self.squares / (self.n - 1.0).max(1.0);
-        let roughness = (scatter - noise / self.n).max(0.0).sqrt();
-        #[expect(clippy::cast_precision_loss, reason = "a share needs no more")]
-        let used_share = self.n / expected.max(1) as f64;
-        // The lines that are missing hide bead that counts; its waviness is
-        // an error then.
-        let hidden = roughness * roughness * (1.0 - used_share).max(0.0) / self.n;
-        // Where the caliper lines run obliquely to the bead, an axis that is
-        // off in direction takes them for longer or shorter.
-        let tilt = self.oblique * self.oblique * self.tilt_variance;
-        let sigma = (noise / (self.n * self.n) + hidden + tilt).sqrt();
-        Averaged { mean: self.mean, sigma, roughness, used_share }
+    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+    fn reach(&self) -> f64 {
+        self.view.along as f64 / 2.0
     }
-}
 
-fn points(
-    caliper: &Caliper,
-    view: &View,
-    surface: &SurfaceMap,
-) -> Result<(SurfacePoint, SurfacePoint), Reject> {
-    let left = surface.to_mm(view.to_image(caliper.left.at, caliper.along));
-    let right = surface.to_mm(view.to_image(caliper.right.at, caliper.along));
-    left.zip(right).ok_or(Reject::OffSurface)
-}
-
-/// Millimetres normal to the bead for each pixel across the gauge.
-fn scale(
-    surface: &SurfaceMap,
-    at: ImagePoint,
-    across: Vector2<f64>,
-    normal: Vector2<f64>,
-) -> Option<f64> {
-    Some((surface.mm_per_px(at)? * across).dot(&normal).abs())
-}
-
-/// Angle of the bead's middle line to the gauge's axis \[rad\].
-fn slant(calipers: &[Caliper], place: &impl Fn(f64) -> f64, reach: f64) -> Result<f64, Reject> {
-    let middles = calipers.iter().map(|caliper| {
-        (place(caliper.along), Vector2::new(f64::midpoint(caliper.left.at, caliper.right.at), 0.0))
-    });
-    let fit = Parabola::fit(middles).ok_or(Reject::NoPair { got: 0.0, need: 0.0 })?;
-    let got_rad = (fit.linear.x / reach).atan();
-    if got_rad.abs() > MAX_SLANT_RAD {
-        return Err(Reject::Crooked { got_rad, limit_rad: MAX_SLANT_RAD });
+    /// Place of a band along the gauge, −1 to 1.
+    fn place(&self, band: usize) -> f64 {
+        (self.middles[band] - self.centre()) / self.reach()
     }
-    Ok(got_rad)
-}
 
-/// Where an edge crosses the middle of the gauge: a line through the calipers
-/// about it, or through the nearest ones where the middle is hidden.
-fn edge_at_middle(
-    calipers: &[Caliper],
-    place: &impl Fn(f64) -> f64,
-    at: impl Fn(&Caliper) -> f64,
-) -> f64 {
-    let mut share = MIDDLE_SHARE;
-    while share < 4.0 {
-        let near = || calipers.iter().filter(|caliper| place(caliper.along).abs() <= share);
-        if near().count() >= 5 {
-            let (mut n, mut sum_p, mut sum_u, mut sum_pp, mut sum_pu) = (0.0, 0.0, 0.0, 0.0, 0.0);
-            for caliper in near() {
-                let (p, u) = (place(caliper.along), at(caliper));
-                n += 1.0;
-                sum_p += p;
-                sum_u += u;
-                sum_pp += p * p;
-                sum_pu += p * u;
-            }
-            let under = n * sum_pp - sum_p * sum_p;
-            if under > 0.0 {
-                return (sum_pp * sum_u - sum_p * sum_pu) / under;
+    fn points(&self, side: usize) -> impl Iterator<Item = Point> + Clone {
+        let places = self.sides[side].places.iter().enumerate();
+        places.filter_map(|(band, located)| {
+            let located = (*located)?;
+            Some(Point { t: self.place(band), u: located.at, weight: located.share })
+        })
+    }
+
+    /// Angle of the bead in the middle of the gauge \[rad\]; refuses beads that
+    /// run too far off the gauge's axis there or at its ends.
+    fn slant(&self, [left, right]: &[Curve; 2]) -> Result<f64, Reject> {
+        let at = |t: f64| (f64::midpoint(left.slope(t), right.slope(t)) / self.reach()).atan();
+        let crooked = |got_rad: f64, limit_rad: f64| Reject::Crooked { got_rad, limit_rad };
+        let middle = at(0.0);
+        if middle.abs() > MAX_SLANT_RAD {
+            return Err(crooked(middle, MAX_SLANT_RAD));
+        }
+        for end in [at(-1.0), at(1.0)] {
+            if end.abs() > MAX_END_SLANT_RAD {
+                return Err(crooked(end, MAX_END_SLANT_RAD));
             }
         }
-        share *= 2.0;
+        self.check_bend(left, right)?;
+        Ok(middle)
     }
-    let sum: f64 = calipers.iter().map(&at).sum();
-    #[expect(clippy::cast_precision_loss, reason = "there are few calipers")]
-    let n = calipers.len().max(1) as f64;
-    sum / n
-}
 
-/// The bead's middle line on the surface, as a parabola over the place along
-/// the gauge, so that a curved bead has a local axis.
-struct Midline {
-    line: Parabola,
-    /// Variance of the direction in the middle \[rad²\], from how far the
-    /// middles lie from the line and over how many calipers that is correlated.
-    tilt_variance: f64,
-}
-
-impl Midline {
-    fn fit(
-        calipers: &[Caliper],
-        place: &impl Fn(f64) -> f64,
-        view: &View,
-        surface: &SurfaceMap,
-        memory: &mut Vec<f64>,
-    ) -> Result<Self, Reject> {
-        let middle = |caliper: &Caliper| -> Result<(f64, Vector2<f64>), Reject> {
-            let (left, right) = points(caliper, view, surface)?;
-            Ok((place(caliper.along), nalgebra::center(&left, &right).coords))
-        };
-        let mut fit = ParabolaFit::default();
-        for caliper in calipers {
-            let (place, at) = middle(caliper)?;
-            fit.add(place, at);
+    /// Refuses corners.
+    fn check_bend(&self, left: &Curve, right: &Curve) -> Result<(), Reject> {
+        let square = self.reach() * self.reach();
+        for (t, _) in NODES {
+            let slope = f64::midpoint(left.slope(t), right.slope(t)) / self.reach();
+            let bend = f64::midpoint(left.bend(t), right.bend(t)).abs() / square;
+            let length = 1.0 + slope * slope;
+            // Radius and width normal to the axis, of which there are so many.
+            let radius = length * length.sqrt() / bend;
+            let width = (right.at(t) - left.at(t)) / length.sqrt();
+            let got_widths = radius / width;
+            if got_widths < LEAST_RADIUS {
+                return Err(Reject::Corner { got_widths, least_widths: LEAST_RADIUS });
+            }
         }
-        let failed = Reject::NoPair { got: 0.0, need: 0.0 };
-        let mut axis = Self { line: fit.solve().ok_or(failed)?, tilt_variance: 0.0 };
-        memory.clear();
-        for caliper in calipers {
-            let (place, at) = middle(caliper)?;
-            let normal = axis.normal(place).ok_or(Reject::OffSurface)?;
-            memory.push((at - axis.line.at(place)).dot(&normal));
-        }
-        let per_place = fit.slope_variance().ok_or(failed)?;
-        axis.tilt_variance =
-            per_place * correlated_variance(memory) / axis.line.linear.norm_squared();
-        Ok(axis)
+        Ok(())
     }
 
-    /// Unit normal of the line at a place; `None` where the line has no
-    /// direction.
-    fn normal(&self, place: f64) -> Option<Vector2<f64>> {
-        let along = self.line.linear + self.line.bend * (2.0 * place);
-        Vector2::new(-along.y, along.x).try_normalize(1e-12)
+    fn check_width(&self, got_mm: f64) -> Result<(), Reject> {
+        let (min_mm, max_mm) = (self.gauge.width_range.0.get(), self.gauge.width_range.1.get());
+        if (min_mm..=max_mm).contains(&got_mm) {
+            Ok(())
+        } else {
+            Err(Reject::WidthOutOfRange { got_mm, min_mm, max_mm })
+        }
+    }
+
+    /// The point of an edge on the surface.
+    fn on_surface(&self, curve: &Curve, t: f64) -> Option<SurfacePoint> {
+        let v = self.centre() + t * self.reach();
+        self.surface.to_mm(self.view.to_image(curve.at(t), v))
+    }
+
+    /// How far each place lies off the course of its edge \[px\].
+    fn lay_off(&self, side: usize, curve: &Curve, off: &mut Vec<Option<f64>>) {
+        off.clear();
+        let places = self.sides[side].places.iter().enumerate();
+        off.extend(places.map(|(band, located)| {
+            located.as_ref().map(|located| located.at - curve.at(self.place(band)))
+        }));
+    }
+
+    /// Mean distance from the course near the middle of the gauge \[px\].
+    fn off_at_middle(&self, off: &[Option<f64>]) -> f64 {
+        let near = |band: &usize| self.place(*band).abs() <= MIDDLE_SHARE;
+        let (mut sum, mut n) = (0.0, 0.0);
+        for value in (0..off.len()).filter(near).filter_map(|band| off[band]) {
+            sum += value;
+            n += 1.0;
+        }
+        sum / f64::max(n, 1.0)
     }
 }
 
-/// Variance of values about zero, times the number of neighbours over which
-/// they are correlated (the integrated autocorrelation up to its first zero),
-/// so that it may be used as if they were independent.
-fn correlated_variance(values: &[f64]) -> f64 {
-    let square: f64 = values.iter().map(|value| value * value).sum();
-    if square <= 0.0 {
-        return 0.0;
-    }
-    let mut time = 1.0;
-    for lag in 1..values.len() / 2 {
-        let product: f64 = values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum();
-        if product <= 0.0 {
-            break;
-        }
-        time += 2.0 * product / square;
-    }
-    #[expect(clippy::cast_precision_loss, reason = "there are few calipers")]
-    let freedom = (values.len() as f64 - 3.0).max(1.0);
-    square / freedom * time
-}
-
-/// p₀ + p₁·t + p₂·t² in two coordinates.
-struct Parabola {
-    start: Vector2<f64>,
-    linear: Vector2<f64>,
+/// An edge about a place, on the surface.
+struct Local {
+    at: SurfacePoint,
+    slope: Vector2<f64>,
     bend: Vector2<f64>,
 }
 
-impl Parabola {
-    fn at(&self, place: f64) -> Vector2<f64> {
-        self.start + (self.linear + self.bend * place) * place
+impl Local {
+    fn of(scene: &Scene<'_>, curve: &Curve, t: f64) -> Option<Self> {
+        let at = scene.on_surface(curve, t)?;
+        let before = scene.on_surface(curve, t - BESIDE)? - at;
+        let after = scene.on_surface(curve, t + BESIDE)? - at;
+        let slope = (after - before) / (2.0 * BESIDE);
+        let bend = (after + before) / (BESIDE * BESIDE);
+        Some(Self { at, slope, bend })
     }
 
-    fn fit(samples: impl Iterator<Item = (f64, Vector2<f64>)>) -> Option<Self> {
-        let mut fit = ParabolaFit::default();
-        for (place, value) in samples {
-            fit.add(place, value);
+    /// Where the normal to a direction through a point crosses the edge.
+    fn crossing(&self, from: SurfacePoint, along: Vector2<f64>) -> SurfacePoint {
+        let ahead = (self.at - from).dot(&along);
+        let (slope, bend) = (self.slope.dot(&along), self.bend.dot(&along));
+        let mut moved = 0.0;
+        for _ in 0..3 {
+            let miss = ahead + moved * (slope + 0.5 * bend * moved);
+            moved -= miss / (slope + bend * moved);
         }
-        fit.solve()
+        self.at + self.slope * moved + self.bend * (0.5 * moved * moved)
     }
 }
 
-/// Normal equations of a parabola.
-#[derive(Default)]
-struct ParabolaFit {
-    matrix: Matrix3<f64>,
-    x: Vector3<f64>,
-    y: Vector3<f64>,
+/// Widths of the bead along the gauge, normal to its local axis.
+struct Sections {
+    /// Mean over the gauge \[mm\].
+    mean: f64,
+    /// Widths as the first three Legendre coefficients over the gauge \[mm\].
+    terms: [f64; 3],
+    /// Part of the lines across the gauge that runs along the bead, mean
+    /// \[mm\].
+    oblique: f64,
+    /// Millimetres normal to the bead for a pixel across the gauge, left and
+    /// right.
+    scales: [f64; 2],
 }
 
-impl ParabolaFit {
-    fn add(&mut self, place: f64, value: Vector2<f64>) {
-        let row = Vector3::new(1.0, place, place * place);
-        self.matrix += row * row.transpose();
-        self.x += row * value.x;
-        self.y += row * value.y;
+impl Sections {
+    /// `None` where an edge has no point on the surface.
+    fn cut(scene: &Scene<'_>, curves: &[Curve; 2]) -> Option<Self> {
+        let mut sections = Self { mean: 0.0, terms: [0.0; 3], oblique: 0.0, scales: [0.0; 2] };
+        for (t, weight) in NODES {
+            let left = Local::of(scene, &curves[0], t)?;
+            let right = Local::of(scene, &curves[1], t)?;
+            let axis = (left.slope + right.slope).try_normalize(1e-12)?;
+            let middle = nalgebra::center(&left.at, &right.at);
+            let across = right.crossing(middle, axis) - left.crossing(middle, axis);
+            let width = across.norm();
+            let share = 0.5 * weight;
+            sections.mean += share * width;
+            sections.terms[0] += share * width;
+            sections.terms[1] += 3.0 * share * width * t;
+            sections.terms[2] += 5.0 * share * width * (1.5 * t * t - 0.5);
+            sections.oblique += share * (right.at - left.at).dot(&axis);
+        }
+        sections.measure_scales(scene, curves)?;
+        sections.mean.is_finite().then_some(sections)
     }
 
-    /// Variance of the slope in the middle for values of variance 1.
-    fn slope_variance(&self) -> Option<f64> {
-        Some(self.matrix.cholesky()?.inverse().m22)
+    fn measure_scales(&mut self, scene: &Scene<'_>, curves: &[Curve; 2]) -> Option<()> {
+        let middles = [scene.on_surface(&curves[0], 0.0)?, scene.on_surface(&curves[1], 0.0)?];
+        let across = (middles[1] - middles[0]).try_normalize(1e-12)?;
+        let slope = |side: usize| -> Option<Vector2<f64>> {
+            Some(scene.on_surface(&curves[side], BESIDE)? - scene.on_surface(&curves[side], -BESIDE)?)
+        };
+        let axis = (slope(0)? + slope(1)?).try_normalize(1e-12)?;
+        let normal = Vector2::new(-axis.y, axis.x);
+        let normal = if normal.dot(&across) < 0.0 { -normal } else { normal };
+        for side in 0..2 {
+            let (u, v) = (curves[side].at(0.0), scene.centre());
+            let beside = scene.surface.to_mm(scene.view.to_image(u + 1.0, v))?;
+            self.scales[side] = (beside - middles[side]).dot(&normal).abs();
+        }
+        Some(())
     }
 
-    fn solve(&self) -> Option<Parabola> {
-        let solver = self.matrix.cholesky()?;
-        let (x, y) = (solver.solve(&self.x), solver.solve(&self.y));
-        let start = Vector2::new(x.x, y.x);
-        Some(Parabola { start, linear: Vector2::new(x.y, y.y), bend: Vector2::new(x.z, y.z) })
+    /// Width at a place along the gauge \[mm\].
+    fn at(&self, t: f64) -> f64 {
+        self.terms[0] + self.terms[1] * t + self.terms[2] * (1.5 * t * t - 0.5)
     }
+}
+
+/// How sure the width is, and how rough the bead.
+struct Spread {
+    sigma: f64,
+    roughness: f64,
+}
+
+impl Spread {
+    fn of(
+        scene: &Scene<'_>,
+        curves: &[Curve; 2],
+        sections: &Sections,
+        memory: &mut Memory,
+    ) -> Self {
+        let (mut variance, mut noise) = (0.0, 0.0);
+        for side in 0..2 {
+            let per_place = mean_variance(scene.sides[side].places);
+            let off = &memory.off[side];
+            let inflation = scatter::inflation(off, per_place, &mut memory.values);
+            let scale = sections.scales[side] * sections.scales[side];
+            let of_mean = per_place * inflation * curves[side].mean_variance;
+            variance += scale * (of_mean + scene.sides[side].common_variance);
+            noise += scale * per_place * inflation;
+        }
+        let roughness = Self::roughness(scene, sections, memory, noise);
+        variance += Self::hidden(scene, roughness);
+        let tilt = Self::tilt_variance(scene, curves, memory);
+        variance += sections.oblique * sections.oblique * tilt;
+        Self { sigma: variance.sqrt(), roughness }
+    }
+
+    /// Standard deviation of the width along the gauge, without the noise of
+    /// its places.
+    fn roughness(scene: &Scene<'_>, sections: &Sections, memory: &Memory, noise: f64) -> f64 {
+        let (mut square, mut n) = (0.0, 0.0);
+        for (band, (left, right)) in memory.off[0].iter().zip(&memory.off[1]).enumerate() {
+            let (Some(left), Some(right)) = (left, right) else { continue };
+            let off = sections.scales[1] * right - sections.scales[0] * left;
+            let width = sections.at(scene.place(band)) + off - sections.mean;
+            square += width * width;
+            n += 1.0;
+        }
+        (square / f64::max(n - 1.0, 1.0) - noise).max(0.0).sqrt()
+    }
+
+    /// The bands that are missing hide bead that counts; its waviness is an
+    /// error then. Each edge has half of it.
+    fn hidden(scene: &Scene<'_>, roughness: f64) -> f64 {
+        scene
+            .sides
+            .iter()
+            .map(|side| {
+                let all = count(side.places.len());
+                let seen: f64 = side.places.iter().flatten().map(|located| located.share).sum();
+                0.5 * roughness * roughness * (1.0 - seen / all).max(0.0) / f64::max(seen, 1.0)
+            })
+            .sum()
+    }
+
+    /// Variance of the axis' direction \[rad²\]: where lines across the gauge
+    /// run obliquely to the bead, an axis that is off takes them for longer or
+    /// shorter. From how far the middles lie off their course, and over how
+    /// many bands that hangs together.
+    fn tilt_variance(scene: &Scene<'_>, curves: &[Curve; 2], memory: &mut Memory) -> f64 {
+        let Memory { off: [left, right], values } = memory;
+        values.clear();
+        let both = left.iter().zip(right.iter());
+        values.extend(both.filter_map(|(left, right)| Some(f64::midpoint((*left)?, (*right)?))));
+        let per_place = scatter::correlated_variance(values);
+        let slope = f64::midpoint(curves[0].slope_variance, curves[1].slope_variance);
+        let cosine = {
+            let slope = f64::midpoint(curves[0].slope(0.0), curves[1].slope(0.0)) / scene.reach();
+            1.0 / (1.0 + slope * slope)
+        };
+        per_place * slope / (scene.reach() * scene.reach()) * cosine * cosine
+    }
+}
+
+/// Mean variance of an edge's places, for a place of all of a band's rows.
+fn mean_variance(places: &[Option<Located>]) -> f64 {
+    let (mut sum, mut n) = (0.0, 0.0);
+    for located in places.iter().flatten() {
+        sum += located.variance * located.share;
+        n += 1.0;
+    }
+    sum / f64::max(n, 1.0)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "there are few bands")]
+fn count(number: usize) -> f64 {
+    number as f64
 }

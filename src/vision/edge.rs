@@ -39,6 +39,14 @@ impl Candidates {
         &self.down[..self.downs]
     }
 
+    /// Of given steps up.
+    #[cfg(test)]
+    pub fn of(up: impl Iterator<Item = Candidate>) -> Self {
+        let mut found = Self::default();
+        up.for_each(|step| keep(&mut found.up, &mut found.ups, step));
+        found
+    }
+
     /// Looks for the strongest steps of a profile's response that reach the
     /// floor. `unit` is a response of 1 in grey levels.
     #[inline(always)]

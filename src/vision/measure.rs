@@ -1,16 +1,18 @@
-//! One frame after the other: bands, candidates, chain, sub-pixel edges, width.
+//! One frame after the other: bands, candidates, contours, sub-pixel edges,
+//! width.
 
 use crate::calib::SurfaceMap;
 use crate::frame::Frame;
 use crate::geometry::ImagePoint;
 
-use super::axis::{self, Caliper};
+use super::axis;
 use super::edge::{Candidates, REACH, respond};
 use super::edge_lines;
 use super::gauge::{Gauge, Method, Polarity};
 use super::noise;
 use super::outlier;
-use super::pair::{Chain, Search};
+use super::contour::Contours;
+use super::pair::{self, Pair, Search};
 use super::pool::Bands;
 use super::reject::Reject;
 use super::step::StepTable;
@@ -18,8 +20,12 @@ use super::strip::{Grey, Strip, Strips, Turner, View};
 use super::trace::{Scene, Tracer};
 use super::width::{Edges, Hints, WidthMeasurement};
 
-/// Share of the caliper lines that must show the bead.
+/// Share of the caliper lines that must show each of the two edges.
 const NEED_SHARE: f64 = 0.6;
+/// Share from which a contour is looked at.
+const LEAST_SHARE: f64 = 0.4;
+/// Share of the rows from which each edge must come.
+const NEED_ROWS: f64 = 0.4;
 /// Share of saturated pixels from which missing contrast is laid to light.
 const MUCH_LIGHT: f64 = 0.3;
 /// Room that a search allows beyond the range of widths, for the difference
@@ -52,12 +58,13 @@ struct Work {
     memory: Vec<f32>,
     response: Vec<i16>,
     candidates: Vec<Candidates>,
-    chain: Chain,
-    other: Chain,
+    ups: Contours,
+    downs: Contours,
     left: Tracer,
     right: Tracer,
     scatter: Vec<f64>,
-    calipers: Vec<Caliper>,
+    middles: Vec<f64>,
+    axis: axis::Memory,
     left_px: Vec<ImagePoint>,
     right_px: Vec<ImagePoint>,
 }
@@ -74,12 +81,13 @@ impl Measurer {
             memory: Vec::new(),
             response: Vec::new(),
             candidates: Vec::new(),
-            chain: Chain::default(),
-            other: Chain::default(),
+            ups: Contours::default(),
+            downs: Contours::default(),
             left: Tracer::default(),
             right: Tracer::default(),
             scatter: Vec::new(),
-            calipers: Vec::new(),
+            middles: Vec::new(),
+            axis: axis::Memory::default(),
             left_px: Vec::new(),
             right_px: Vec::new(),
         };
@@ -146,8 +154,8 @@ impl Work {
         self.noise = noise::of(strip, &mut self.memory);
         self.bands.pool(strip, self.gauge.calipers);
         self.find_candidates();
-        self.find_chain(view, range)?;
-        self.trace(strip)?;
+        let pair = self.find_pair(range)?;
+        self.trace(strip, pair)?;
         self.sort_out()?;
         self.check_contrast()?;
         self.width_on(view, surface)
@@ -170,22 +178,26 @@ impl Work {
             respond(profile, &mut self.response);
             self.candidates.push(Candidates::find(&self.response, floor, unit));
         }
+        #[expect(clippy::cast_precision_loss, reason = "a band has few rows")]
+        let band_px = strip_rows(&self.bands) as f32 / self.bands.count().max(1) as f32;
+        self.ups.search(&self.candidates, true, band_px, LEAST_SHARE);
+        self.downs.search(&self.candidates, false, band_px, LEAST_SHARE);
     }
 
     #[inline(always)]
-    fn trace<T: Grey>(&mut self, strip: &Strip<'_, T>) -> Result<(), Reject> {
-        let pairs = self.chain.pairs();
+    fn trace<T: Grey>(&mut self, strip: &Strip<'_, T>, pair: Found) -> Result<(), Reject> {
+        let (lefts, rights) = pair.sides(&self.ups, &self.downs);
+        let (lefts, rights) = (&lefts.all()[pair.pair.left].at, &rights.all()[pair.pair.right].at);
         let scene = Scene {
             strip,
             bands: &self.bands,
             noise: self.noise,
-            width_px: narrowest(&self.chain, &mut self.memory),
+            width_px: narrowest(lefts, rights, &mut self.memory),
             bead_after: true,
         };
-        let lefts = pairs.iter().map(|pair| pair.map(|pair| pair.left));
-        let rights = pairs.iter().map(|pair| pair.map(|pair| pair.right));
-        let left = self.left.trace(&self.table, &scene, lefts);
-        let right = self.right.trace(&self.table, &Scene { bead_after: false, ..scene }, rights);
+        let left = self.left.trace(&self.table, &scene, lefts.iter().copied());
+        let scene = Scene { bead_after: false, ..scene };
+        let right = self.right.trace(&self.table, &scene, rights.iter().copied());
         if left && right { Ok(()) } else { Err(Reject::NoPair { got: 0.0, need: NEED_SHARE }) }
     }
 
@@ -205,41 +217,43 @@ impl Work {
         Ok(range)
     }
 
-    fn find_chain(&mut self, view: &View, range: (f32, f32)) -> Result<(), Reject> {
-        self.search(view, range);
-        let got = self.chain.share();
-        if got >= NEED_SHARE {
-            return Ok(());
+    /// The bead's two edges among the contours.
+    fn find_pair(&mut self, width_px: (f32, f32)) -> Result<Found, Reject> {
+        let found = self.search(width_px);
+        if let Some(found) = found.filter(|found| found.pair.share >= NEED_SHARE) {
+            return Ok(found);
         }
+        let got = found.map_or(0.0, |found| found.pair.share);
         let refused = Reject::NoPair { got, need: NEED_SHARE };
         // A bead of another width deserves to be called that.
-        self.search(view, (4.0, f32::MAX));
-        if self.chain.share() < NEED_SHARE || !self.is_strong() {
-            return Err(self.too_much_light().unwrap_or(refused));
+        let least = self.gauge.min_contrast_grey;
+        let strong = |found: &Found| {
+            found.pair.share >= NEED_SHARE && f64::from(found.pair.step) >= least
+        };
+        match self.search((4.0, f32::MAX)).filter(strong) {
+            Some(found) => Ok(found),
+            None => Err(self.too_much_light().unwrap_or(refused)),
         }
-        Ok(())
     }
 
-    fn search(&mut self, view: &View, width_px: (f32, f32)) {
-        #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-        let band_px = view.along as f32 / self.bands.count().max(1) as f32;
-        let bright = self.gauge.polarity != Polarity::Dark;
-        self.chain.search(&self.candidates, &Search { bright, width_px, band_px });
-        if self.gauge.polarity == Polarity::Any {
-            self.other.search(&self.candidates, &Search { bright: false, width_px, band_px });
-            if self.other.score() > self.chain.score() {
-                std::mem::swap(&mut self.chain, &mut self.other);
+    fn search(&mut self, width_px: (f32, f32)) -> Option<Found> {
+        let search = Search { width_px };
+        let mut best: Option<Found> = None;
+        for bright in [true, false] {
+            let unwanted = if bright { Polarity::Dark } else { Polarity::Bright };
+            if self.gauge.polarity == unwanted {
+                continue;
             }
+            let (lefts, rights) =
+                if bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
+            let pair = pair::find(lefts, rights, &search, &mut self.memory);
+            best = match (best, pair) {
+                (Some(best), Some(pair)) if best.pair.score >= pair.score => Some(best),
+                (best, None) => best,
+                (_, Some(pair)) => Some(Found { pair, bright }),
+            };
         }
-    }
-
-    /// Whether the chain's steps are far above the noise.
-    fn is_strong(&self) -> bool {
-        let pairs = self.chain.pairs();
-        let steps: f32 = pairs.iter().flatten().map(|pair| pair.step).sum();
-        #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
-        let mean = steps / pairs.iter().flatten().count().max(1) as f32;
-        f64::from(mean) >= self.gauge.min_contrast_grey
+        best
     }
 
     fn too_much_light(&self) -> Option<Reject> {
@@ -253,13 +267,10 @@ impl Work {
         for side in [&mut self.left, &mut self.right] {
             worst = worst.max(outlier::sort_out(side.edges_mut(), &mut self.scatter));
         }
-        let both = self.left.edges().iter().zip(self.right.edges());
-        let used = both.filter(|(left, right)| left.is_some() && right.is_some()).count();
-        #[expect(clippy::cast_precision_loss, reason = "a share needs no more")]
-        let got = used as f64 / self.bands.count().max(1) as f64;
-        if got < NEED_SHARE || worst > MAX_SCATTER_PX {
+        let got = self.left.used_share().min(self.right.used_share());
+        if got < NEED_ROWS || worst > MAX_SCATTER_PX {
             let got = if worst > MAX_SCATTER_PX { 0.0 } else { got };
-            return Err(Reject::NoPair { got, need: NEED_SHARE });
+            return Err(Reject::NoPair { got, need: NEED_ROWS });
         }
         Ok(())
     }
@@ -291,30 +302,47 @@ impl Work {
             blur_px: f64::midpoint(self.left.blur_px, self.right.blur_px),
             noise_grey: self.noise.into(),
             saturated_share: self.bands.saturated_share(),
-            used_share: 0.0,
+            used_share: f64::midpoint(self.left.used_share(), self.right.used_share()),
         };
-        self.calipers.clear();
-        for (band, pair) in self.left.edges().iter().zip(self.right.edges()).enumerate() {
-            if let (Some(left), Some(right)) = pair {
-                self.calipers.push(Caliper {
-                    along: self.bands.middle(band),
-                    left: *left,
-                    right: *right,
-                });
-                let v = self.bands.middle(band);
-                self.left_px.push(view.to_image(left.at, v));
-                self.right_px.push(view.to_image(right.at, v));
-            }
+        self.middles.clear();
+        self.middles.extend((0..self.bands.count()).map(|band| self.bands.middle(band)));
+        for (tracer, points) in
+            [(&self.left, &mut self.left_px), (&self.right, &mut self.right_px)]
+        {
+            let places = tracer.edges().iter().zip(&self.middles);
+            points.extend(places.filter_map(|(edge, &v)| Some(view.to_image(edge.as_ref()?.at, v))));
         }
-        let calipers = (self.calipers.as_slice(), self.bands.count());
-        axis::width(calipers, view, surface, &self.gauge, hints, &mut self.scatter)
+        let sides = [&self.left, &self.right].map(|tracer| axis::Side {
+            places: tracer.edges(),
+            common_variance: tracer.common_variance,
+        });
+        let (gauge, middles) = (&self.gauge, self.middles.as_slice());
+        axis::width(&axis::Scene { view, surface, gauge, middles, sides }, hints, &mut self.axis)
     }
 }
 
-/// A narrow width among the chain's pairs \[px\], for the size of windows.
-fn narrowest(chain: &Chain, memory: &mut Vec<f32>) -> f32 {
+/// A pair and its polarity.
+#[derive(Debug, Clone, Copy)]
+struct Found {
+    pair: Pair,
+    bright: bool,
+}
+
+impl Found {
+    /// Contours of left and right edges.
+    fn sides<'a>(&self, ups: &'a Contours, downs: &'a Contours) -> (&'a Contours, &'a Contours) {
+        if self.bright { (ups, downs) } else { (downs, ups) }
+    }
+}
+
+fn strip_rows(bands: &Bands) -> usize {
+    bands.count().checked_sub(1).map_or(0, |last| bands.rows(last).1)
+}
+
+/// A narrow distance between two contours \[px\], for the size of windows.
+fn narrowest(left: &[Option<f32>], right: &[Option<f32>], memory: &mut Vec<f32>) -> f32 {
     memory.clear();
-    memory.extend(chain.pairs().iter().flatten().map(|pair| pair.right - pair.left));
+    memory.extend(left.iter().zip(right).filter_map(|(left, right)| Some((*right)? - (*left)?)));
     let rank = memory.len() / 10;
     if memory.is_empty() {
         return 0.0;

@@ -1,5 +1,5 @@
 //! Noise of a pixel, from the differences of neighbours along the bead: light,
-//! texture and the bead itself change little from one row to the next but one.
+//! texture and the bead itself change little from one row to the next.
 
 use super::strip::{Grey, Strip};
 
@@ -7,7 +7,7 @@ use super::strip::{Grey, Strip};
 const ROWS: usize = 32;
 const PLACES: usize = 30;
 /// Distance of the neighbours \[px\].
-const APART: usize = 2;
+const APART: usize = 1;
 /// Differences beyond so many medians are edges and grains.
 const FEW_MEDIANS: f32 = 4.5;
 /// Share of the variance of a normal number that lies within as many medians

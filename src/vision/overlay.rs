@@ -21,6 +21,13 @@ const UNLIKE: [f32; 2] = [2.0, 1.7];
 /// Blur that the place's rounding to half a pixel adds \[px²\].
 const ROUNDING: f64 = 1.0 / 48.0;
 
+/// Slopes of the surroundings are believed from so many standard deviations
+/// on.
+const SURE: f64 = 2.5;
+/// Mean square distance of places from their middle from which on they show a
+/// slope \[px²\].
+const STRAIGHT: f64 = 3.0;
+
 const LEAST_BLUR_PX: f64 = 0.3;
 const MOST_BLUR_PX: f64 = 15.0;
 const MAX_STEPS: usize = 12;
@@ -60,6 +67,9 @@ pub struct Shape {
     /// Change of the level for each pixel away from the edge, before and after
     /// it \[1/px\].
     pub shading: (f64, f64),
+    /// Variance of the edge's position that doubt about the shading leaves
+    /// \[px²\].
+    pub variance: f64,
 }
 
 /// Lays rows over each other; keeps its memory from frame to frame.
@@ -192,14 +202,20 @@ impl Overlay {
             after: 1.0,
             extent: room,
             shading: (0.0, 0.0),
+            variance: 0.0,
         };
         let room = self.up_to_neighbours(start, noise, room);
         let mut shape = self.fit(table, Shape { extent: room, ..start }, noise)?;
         shape.blur = (shape.blur * shape.blur - ROUNDING).max(LEAST_BLUR_PX.powi(2)).sqrt();
-        let (before, shading_before) = self.plain(table, &shape, noise, -1.0, room.before);
-        let (after, shading_after) = self.plain(table, &shape, noise, 1.0, room.after);
+        let (before, line_before) = self.plain(table, &shape, noise, -1.0, room.before);
+        let (after, line_after) = self.plain(table, &shape, noise, 1.0, room.after);
         shape.extent = Extent { before, after };
-        shape.shading = (shading_before, shading_after);
+        let ((slope_before, doubt_before), (slope_after, doubt_after)) =
+            (line_before.sure_slope(noise), line_after.sure_slope(noise));
+        shape.shading = (slope_before, slope_after);
+        // A level that is off by a share moves the edge by √π blurs times it.
+        let per_level = std::f64::consts::PI * shape.blur * shape.blur;
+        shape.variance = per_level * (doubt_before + doubt_after);
         Some(shape)
     }
 
@@ -302,8 +318,7 @@ impl Overlay {
     }
 
     /// How far from the edge a side is plain, that is a straight line within
-    /// what noise explains, and the slope of that line \[1/px away from the
-    /// edge\] as far as it is sure.
+    /// what noise explains, and that line.
     fn plain(
         &self,
         table: &StepTable,
@@ -311,7 +326,7 @@ impl Overlay {
         noise: f64,
         sign: f64,
         room: f64,
-    ) -> (f64, f64) {
+    ) -> (f64, Line) {
         let height = shape.after - shape.before;
         let first = 3.0 * shape.blur;
         let mut line = Line::default();
@@ -330,13 +345,15 @@ impl Overlay {
             let (expected, variance) = line.at(block.middle());
             let off = block.mean() - expected;
             let doubt = noise * noise * (variance + 1.0 / block.weight);
-            if line.weight > 0.0 && off.abs() > 4.0 * doubt.sqrt() + 0.006 * height {
+            // The first few pixels show the slope.
+            let known = line.weight > 0.0 && line.spread() >= STRAIGHT * line.weight;
+            if known && off.abs() > 4.0 * doubt.sqrt() + 0.006 * height {
                 break;
             }
             line.join(&block);
             end += 2.0;
         }
-        (end, line.sure_slope(noise))
+        (end, line)
     }
 }
 
@@ -391,21 +408,23 @@ impl Line {
             return (0.0, 0.0);
         }
         let away = x - self.middle();
-        if self.spread() < 2.0 * self.weight {
+        if self.spread() < STRAIGHT * self.weight {
             return (self.mean(), 1.0 / self.weight);
         }
         (self.mean() + self.slope() * away, 1.0 / self.weight + away * away / self.spread())
     }
 
-    /// The slope less what noise may have made of it: nothing below two
-    /// standard deviations, nearly all far above.
-    fn sure_slope(&self, noise: f64) -> f64 {
-        if self.weight <= 0.0 || self.spread() < 2.0 * self.weight {
-            return 0.0;
+    /// The slope less what noise may have made of it – nothing below 2.5
+    /// standard deviations, nearly all far above –, and the variance that its
+    /// doubt leaves to the line at the edge.
+    fn sure_slope(&self, noise: f64) -> (f64, f64) {
+        if self.weight <= 0.0 || self.spread() < STRAIGHT * self.weight {
+            return (0.0, 0.0);
         }
         let slope = self.slope();
         let variance = noise * noise / self.spread();
-        slope * (1.0 - 4.0 * variance / (slope * slope)).max(0.0)
+        let sure = (1.0 - SURE * SURE * variance / (slope * slope)).max(0.0);
+        (slope * sure, sure * variance * self.middle() * self.middle())
     }
 }
 

@@ -7,6 +7,13 @@ use super::pool::Bands;
 /// Bands on either side that a smoothed value is taken from.
 const NEIGHBOURS: usize = 3;
 
+/// Neighbours by whose median wild values are told.
+const WILD_WINDOW: usize = 9;
+/// Distance from it that makes a value wild \[px\], and in typical distances
+/// beside.
+const WILD_PX: f32 = 1.2;
+const WILD_TIMES: f32 = 4.0;
+
 /// Fills gaps from their neighbours, in a straight line; `false` where there
 /// is nothing at all.
 pub fn fill(rough: impl Iterator<Item = Option<f32>>, out: &mut Vec<f32>) -> bool {
@@ -30,6 +37,49 @@ pub fn fill(rough: impl Iterator<Item = Option<f32>>, out: &mut Vec<f32>) -> boo
     let end = out[last];
     out[last + 1..].fill(end);
     true
+}
+
+/// Takes out values that lie far off the median of their neighbours: where a
+/// grain covers the edge for a few bands, its contour is not the edge's.
+/// `memory` is scratch.
+pub fn take_out_wild(values: &mut [f32], memory: &mut Vec<f32>) {
+    let count = values.len();
+    if count < WILD_WINDOW {
+        return;
+    }
+    memory.clear();
+    for band in 0..count {
+        let from = band.saturating_sub(WILD_WINDOW / 2).min(count - WILD_WINDOW);
+        let mut window = [0.0; WILD_WINDOW];
+        window.copy_from_slice(&values[from..from + WILD_WINDOW]);
+        // Along a slanted edge the median of a window that is not centred lies
+        // off the band by the slope between.
+        let slope = (median3(&window[6..]) - median3(&window[..3])) / 6.0;
+        let off = signed(band) - signed(from + WILD_WINDOW / 2);
+        window.sort_unstable_by(f32::total_cmp);
+        memory.push(values[band] - window[WILD_WINDOW / 2] - slope * off);
+    }
+    let offs = memory.len();
+    memory.extend_from_within(..);
+    for off in &mut memory[offs..] {
+        *off = off.abs();
+    }
+    let typical = *memory[offs..].select_nth_unstable_by(offs / 2, f32::total_cmp).1;
+    for (value, off) in values.iter_mut().zip(&memory[..offs]) {
+        if off.abs() > WILD_PX + WILD_TIMES * typical {
+            *value = f32::NAN;
+        }
+    }
+}
+
+fn median3(values: &[f32]) -> f32 {
+    let (a, b, c) = (values[0], values[1], values[2]);
+    a.max(b.min(c)).min(b.max(c))
+}
+
+#[expect(clippy::cast_precision_loss, reason = "there are few bands")]
+fn signed(band: usize) -> f32 {
+    band as f32
 }
 
 /// Median of three, so that a single wild value leads nothing astray.

@@ -43,6 +43,13 @@ pub enum Reject {
         /// Largest angle that is measured \[rad\].
         limit_rad: f64,
     },
+    /// The bead bends too sharply for a width normal to its axis: a corner.
+    Corner {
+        /// Radius of its axis, in its widths.
+        got_widths: f64,
+        /// Smallest radius that is measured, in widths.
+        least_widths: f64,
+    },
     /// The bead touches the border of the gauge.
     Clipped,
     /// The gauge does not lie within the image.
@@ -65,6 +72,7 @@ impl Reject {
             Self::Saturated { .. } => "saturated",
             Self::WidthOutOfRange { .. } => "width_out_of_range",
             Self::Crooked { .. } => "crooked",
+            Self::Corner { .. } => "corner",
             Self::Clipped => "clipped",
             Self::WrongSize { .. } => "wrong_size",
             Self::OffSurface => "off_surface",
@@ -99,6 +107,10 @@ impl fmt::Display for Reject {
                 "edges at {:.0} degrees to the gauge's axis, measured are up to {:.0}",
                 got_rad.to_degrees(),
                 limit_rad.to_degrees()
+            ),
+            Self::Corner { got_widths, least_widths } => write!(
+                f,
+                "the bead bends with a radius of {got_widths:.1} widths, measured are {least_widths:.1} or more"
             ),
             Self::Clipped => f.write_str("the bead touches the border of the gauge"),
             Self::WrongSize { image: (width, height) } => {

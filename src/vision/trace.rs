@@ -76,6 +76,9 @@ pub struct Tracer {
     edges: Vec<Option<Located>>,
     /// Blur of the edge \[px\].
     pub blur_px: f64,
+    /// Variance of the whole edge's position that all places share, from
+    /// shading that is not known better \[px²\].
+    pub common_variance: f64,
 }
 
 /// Sums over the rows of a band that count.
@@ -93,6 +96,12 @@ impl Tracer {
     /// The edges of the last frame, band by band.
     pub fn edges(&self) -> &[Option<Located>] {
         &self.edges
+    }
+
+    /// Share of all rows that the edges come from.
+    pub fn used_share(&self) -> f64 {
+        let used: f64 = self.edges.iter().flatten().map(|edge| edge.share).sum();
+        used / float(self.edges.len().max(1))
     }
 
     /// The same, for those who sort out outliers.
@@ -113,6 +122,12 @@ impl Tracer {
         if !path::fill(rough, &mut self.rough) {
             return false;
         }
+        path::take_out_wild(&mut self.rough, &mut self.sorted);
+        let rest = self.rough.iter().map(|at| at.is_finite().then_some(*at));
+        if !path::fill(rest, &mut self.path) {
+            return false;
+        }
+        std::mem::swap(&mut self.rough, &mut self.path);
         path::median_of_three(&mut self.rough);
         path::smooth(&self.rough, &mut self.path);
         self.pick_levels(scene);
@@ -124,6 +139,7 @@ impl Tracer {
         };
         let shape = self.adopt(shape);
         self.blur_px = shape.blur;
+        self.common_variance = shape.variance;
         self.template.tabulate(table, &shape);
         for _ in 0..MAX_PASSES {
             self.rows.draw(scene.bands, &self.path, &self.before, &self.step);
@@ -208,6 +224,7 @@ impl Tracer {
             before: 0.0,
             after: 1.0,
             shading: (shape.shading.0 / height, shape.shading.1 / height),
+            variance: shape.variance / (height * height),
             ..shape
         }
     }

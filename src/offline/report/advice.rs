@@ -38,6 +38,10 @@ pub fn on(status: &str) -> (&'static str, &'static str) {
             "By the calibration an edge does not lie on the measured surface.",
             "Calibrate again, or check surface_height_mm and the robot's z.",
         ),
+        "corner" => (
+            "The bead bends sharply within the gauge.",
+            "Corners have no width normal to the bead; make the gauge shorter if gentle bends are refused.",
+        ),
         "unreadable" => (
             "The frame could not be decoded.",
             "Look at the file or the camera's cable; the log names each one.",
@@ -60,6 +64,7 @@ mod tests {
             Reject::Saturated { got: 0.5, limit: 0.1 },
             Reject::WidthOutOfRange { got_mm: 1.0, min_mm: 2.0, max_mm: 3.0 },
             Reject::Crooked { got_rad: 1.0, limit_rad: 0.3 },
+            Reject::Corner { got_widths: 0.5, least_widths: 1.5 },
             Reject::Clipped,
             Reject::WrongSize { image: (1, 1) },
             Reject::OffSurface,

@@ -1,0 +1,257 @@
+//! Edges that run along the bead: chains of steps, one a band, found by
+//! dynamic programming. Neighbours agree, bands without a fitting step are
+//! skipped; sparks and grains are no chains. The strongest chain is found
+//! first, then the strongest of what it leaves.
+
+use super::edge::{Candidate, Candidates, KEPT};
+
+/// Contours of one sign that are looked for.
+const MOST: usize = 6;
+/// Bands that a contour may jump over at once.
+const MAX_SKIP: usize = 4;
+/// Cost of a band without a step, in typical steps.
+const SKIP_COST: f32 = 0.35;
+/// Cost of running aside as steeply as an edge may.
+const ASIDE_COST: f32 = 0.25;
+/// Cost beyond which two steps are not neighbours.
+const BREAK_COST: f32 = 1.0;
+/// Slope against the gauge's axis up to which edges run freely; a bead that
+/// slants 20 degrees and bulges by another 15 stays below.
+const FREE_SLOPE: f32 = 0.7;
+/// Marks the first step of a contour.
+const NONE: u16 = u16::MAX;
+
+/// An edge that runs along the bead.
+#[derive(Debug, Clone, Default)]
+pub struct Contour {
+    /// Its step in every band \[px\], or none where it is hidden.
+    pub at: Vec<Option<f32>>,
+    /// Mean height of its steps \[grey levels\].
+    pub step: f32,
+    /// Share of the bands in which it has a step.
+    pub share: f64,
+    /// How far a step lies off the line between its neighbours, median \[px\]:
+    /// little for an edge, much for sparks that happen to lie in a row.
+    pub wobble: f32,
+}
+
+/// Contours of one sign; keeps its memory from frame to frame.
+#[derive(Debug, Clone, Default)]
+pub struct Contours {
+    scores: Vec<[f32; KEPT]>,
+    froms: Vec<[u16; KEPT]>,
+    used: Vec<u16>,
+    steps: Vec<f32>,
+    found: Vec<Contour>,
+    count: usize,
+}
+
+impl Contours {
+    /// What was found, the strongest first.
+    pub fn all(&self) -> &[Contour] {
+        &self.found[..self.count]
+    }
+
+    /// Looks for contours of steps up or down that reach `least_share` of the
+    /// bands. `band_px` is the height of a band.
+    pub fn search(&mut self, bands: &[Candidates], up: bool, band_px: f32, least_share: f64) {
+        self.used.clear();
+        self.used.resize(bands.len(), 0);
+        self.scores.resize(bands.len(), [0.0; KEPT]);
+        self.froms.resize(bands.len(), [NONE; KEPT]);
+        self.found.resize_with(MOST, Contour::default);
+        self.count = 0;
+        let steps = |band: usize| if up { bands[band].up() } else { bands[band].down() };
+        while self.count < MOST {
+            let typical = self.typical_step(bands.len(), &steps);
+            if typical <= 0.0 {
+                return;
+            }
+            let Some(last) = self.link(bands.len(), &steps, band_px, typical) else { return };
+            self.follow(last, &steps);
+            if self.found[self.count].share < least_share {
+                return;
+            }
+            self.count += 1;
+        }
+    }
+
+    fn is_used(&self, band: usize, index: usize) -> bool {
+        self.used[band] >> index & 1 == 1
+    }
+
+    /// A strong but not extreme step: the 70th percentile of each band's best.
+    fn typical_step<'a>(
+        &mut self,
+        bands: usize,
+        steps: &impl Fn(usize) -> &'a [Candidate],
+    ) -> f32 {
+        self.steps.clear();
+        for band in 0..bands {
+            let free = steps(band).iter().enumerate();
+            let best = free
+                .filter(|&(index, _)| !self.is_used(band, index))
+                .map(|(_, step)| step.step)
+                .fold(0.0, f32::max);
+            if best > 0.0 {
+                self.steps.push(best);
+            }
+        }
+        if self.steps.is_empty() {
+            return 0.0;
+        }
+        let rank = self.steps.len() * 7 / 10;
+        *self.steps.select_nth_unstable_by(rank, f32::total_cmp).1
+    }
+
+    /// Fills in scores and returns the last step of the best contour.
+    fn link<'a>(
+        &mut self,
+        bands: usize,
+        steps: &impl Fn(usize) -> &'a [Candidate],
+        band_px: f32,
+        typical: f32,
+    ) -> Option<(usize, usize)> {
+        let mut best = None;
+        let mut best_total = 0.0;
+        for band in 0..bands {
+            for (index, step) in steps(band).iter().enumerate() {
+                if self.is_used(band, index) {
+                    continue;
+                }
+                let reward = (step.step / typical).sqrt().min(1.2);
+                let (score, from) = self.best_before(band, step.at, steps, band_px);
+                self.scores[band][index] = score + reward;
+                self.froms[band][index] = from;
+                let total = score + reward - SKIP_COST * float(bands - 1 - band);
+                if total > best_total {
+                    best_total = total;
+                    best = Some((band, index));
+                }
+            }
+        }
+        best
+    }
+
+    fn best_before<'a>(
+        &self,
+        band: usize,
+        at: f32,
+        steps: &impl Fn(usize) -> &'a [Candidate],
+        band_px: f32,
+    ) -> (f32, u16) {
+        let mut best = (-SKIP_COST * float(band), NONE);
+        for gap in 1..=(MAX_SKIP + 1).min(band) {
+            let before = band - gap;
+            let skipped = SKIP_COST * float(gap - 1);
+            let free = FREE_SLOPE * band_px * float(gap) + 1.0;
+            for (index, step) in steps(before).iter().enumerate() {
+                if self.is_used(before, index) {
+                    continue;
+                }
+                let moved = (step.at - at).abs();
+                let beyond = 0.5 * (moved - free).max(0.0);
+                let cost = ASIDE_COST * moved.min(free) / free + beyond * beyond;
+                let score = self.scores[before][index] - cost - skipped;
+                if cost < BREAK_COST && score > best.0 {
+                    best = (score, pack(gap, index));
+                }
+            }
+        }
+        best
+    }
+
+    /// Follows a contour back from its last step and takes its steps out.
+    fn follow<'a>(&mut self, last: (usize, usize), steps: &impl Fn(usize) -> &'a [Candidate]) {
+        let contour = &mut self.found[self.count];
+        contour.at.clear();
+        contour.at.resize(self.used.len(), None);
+        let (mut sum, mut n) = (0.0, 0.0);
+        let (mut band, mut index) = last;
+        loop {
+            let step = steps(band)[index];
+            contour.at[band] = Some(step.at);
+            self.used[band] |= 1 << index;
+            sum += step.step;
+            n += 1.0;
+            let from = self.froms[band][index];
+            if from == NONE {
+                break;
+            }
+            band -= usize::from(from >> 8);
+            index = usize::from(from & 0xff);
+        }
+        contour.step = sum / n;
+        contour.share = f64::from(n) / f64::from(float(self.used.len()));
+        contour.wobble = wobble(&contour.at, &mut self.steps);
+    }
+}
+
+fn wobble(at: &[Option<f32>], memory: &mut Vec<f32>) -> f32 {
+    memory.clear();
+    memory.extend(at.windows(3).filter_map(|three| {
+        Some((three[1]? - 0.5 * (three[0]? + three[2]?)).abs())
+    }));
+    if memory.is_empty() {
+        return f32::INFINITY;
+    }
+    let middle = memory.len() / 2;
+    *memory.select_nth_unstable_by(middle, f32::total_cmp).1
+}
+
+fn pack(gap: usize, index: usize) -> u16 {
+    u16::try_from(gap << 8 | index).unwrap_or(NONE)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "there are few bands")]
+fn float(number: usize) -> f32 {
+    number as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn band(places: &[(f32, f32)]) -> Candidates {
+        Candidates::of(places.iter().map(|&(at, step)| Candidate { at, step }))
+    }
+
+    fn search(bands: &[Candidates]) -> Contours {
+        let mut contours = Contours::default();
+        contours.search(bands, true, 4.0, 0.4);
+        contours
+    }
+
+    #[test]
+    fn a_contour_follows_the_edge_and_skips_what_is_hidden() {
+        let bands: Vec<Candidates> = (0..20u8)
+            .map(|k| if k == 7 || k == 8 { band(&[]) } else { band(&[(60.0 + f32::from(k), 80.0)]) })
+            .collect();
+        let found = search(&bands);
+        assert_eq!(found.all().len(), 1);
+        assert_eq!(found.all()[0].at[8], None);
+        assert_eq!(found.all()[0].at[19], Some(79.0));
+        assert!((found.all()[0].share - 0.9).abs() < 1e-12);
+    }
+
+    #[test]
+    fn sparks_that_are_stronger_do_not_lead_astray() {
+        let bands: Vec<Candidates> = (0..20u8)
+            .map(|k| {
+                let far = |n: u8| f32::from((k * 37 + n * 91) % 200) + 100.0;
+                band(&[(60.0, 60.0), (far(1), 160.0), (far(2), 160.0), (far(3), 160.0)])
+            })
+            .collect();
+        let found = search(&bands);
+        assert!(found.all()[0].at.iter().flatten().all(|&at| at == 60.0));
+    }
+
+    #[test]
+    fn two_edges_are_two_contours_the_stronger_first() {
+        let bands: Vec<Candidates> =
+            (0..20u8).map(|k| band(&[(60.0 + 0.5 * f32::from(k), 50.0), (90.0, 80.0)])).collect();
+        let found = search(&bands);
+        assert_eq!(found.all().len(), 2);
+        assert_eq!((found.all()[0].step, found.all()[1].step), (80.0, 50.0));
+    }
+}

@@ -1,0 +1,170 @@
+//! The course of an edge along the gauge as a short polynomial: where it runs
+//! in the mean, in which direction, and how it bends.
+
+use nalgebra::{SMatrix, SVector};
+
+/// Terms that a curve has at most: up to t⁴.
+const MOST: usize = 5;
+/// Terms of a straight bead, and of one that is evenly bent.
+const STRAIGHT: usize = 2;
+const FEW: usize = 3;
+/// A bend is believed from so many standard deviations on.
+const SURE: f64 = 4.0;
+/// Scatter about a parabola that is looked at for more \[px\].
+const NOTABLE_PX: f64 = 0.25;
+/// Part of the scatter's square that more terms must explain.
+const EXPLAINED: f64 = 0.8;
+
+/// A point of an edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// Place along the gauge: −1 at its first row, 1 at its last.
+    pub t: f64,
+    /// Position across it \[px\].
+    pub u: f64,
+    /// Rows that it comes from, as a share of its band.
+    pub weight: f64,
+}
+
+/// A sum of Legendre polynomials, so that the first coefficient is the mean
+/// over the whole gauge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Curve {
+    terms: [f64; MOST],
+    /// Variance of the mean over the gauge, for points of weight 1 and
+    /// variance 1.
+    pub mean_variance: f64,
+    /// Variance of the second coefficient, the direction, likewise.
+    pub slope_variance: f64,
+    /// Variance of the third, the bend.
+    bend_variance: f64,
+}
+
+impl Curve {
+    /// Fits points; `None` where there are too few or where they lie too close
+    /// together.
+    pub fn fit(points: impl Iterator<Item = Point> + Clone) -> Option<Self> {
+        let straight = Self::with_terms::<STRAIGHT>(points.clone())?;
+        let Some(few) = Self::with_terms::<FEW>(points.clone()) else { return Some(straight) };
+        let (off, n) = few.scatter(points.clone());
+        // An unsure bend would tell wrong places beyond the gauge's ends,
+        // where the normals of a slanted bead may cross it.
+        if few.terms[2] * few.terms[2] < SURE * SURE * off * few.bend_variance {
+            return Some(straight);
+        }
+        if off <= NOTABLE_PX * NOTABLE_PX || n < 4.0 * float(MOST) {
+            return Some(few);
+        }
+        let Some(more) = Self::with_terms::<MOST>(points.clone()) else { return Some(few) };
+        let explained = more.scatter(points).0 < (1.0 - EXPLAINED) * off;
+        Some(if explained { more } else { few })
+    }
+
+    fn with_terms<const N: usize>(points: impl Iterator<Item = Point>) -> Option<Self> {
+        let mut matrix = SMatrix::<f64, N, N>::zeros();
+        let mut vector = SVector::<f64, N>::zeros();
+        for point in points {
+            let values = legendre(point.t);
+            for i in 0..N {
+                let weighted = point.weight * values[i];
+                vector[i] += weighted * point.u;
+                for j in 0..=i {
+                    matrix[(i, j)] += weighted * values[j];
+                }
+            }
+        }
+        matrix.fill_upper_triangle_with_lower_triangle();
+        let inverse = matrix.cholesky()?.inverse();
+        let found = inverse * vector;
+        let mut terms = [0.0; MOST];
+        terms[..N].copy_from_slice(found.as_slice());
+        let sound = terms.iter().all(|term| term.is_finite());
+        let (mean_variance, slope_variance) = (inverse[(0, 0)], inverse[(1, 1)]);
+        let bend_variance = if N > 2 { inverse[(N.min(3) - 1, N.min(3) - 1)] } else { 0.0 };
+        sound.then_some(Self { terms, mean_variance, slope_variance, bend_variance })
+    }
+
+    /// Position at a place \[px\].
+    pub fn at(&self, t: f64) -> f64 {
+        let values = legendre(t);
+        (0..MOST).map(|k| self.terms[k] * values[k]).sum()
+    }
+
+    /// Change of the position at a place, for a step of 1 in t \[px\].
+    pub fn slope(&self, t: f64) -> f64 {
+        let [_, b, c, d, e] = self.terms;
+        b + 3.0 * c * t + 1.5 * d * (5.0 * t * t - 1.0) + 2.5 * e * t * (7.0 * t * t - 3.0)
+    }
+
+    /// Second derivative at a place \[px\].
+    pub fn bend(&self, t: f64) -> f64 {
+        let [_, _, c, d, e] = self.terms;
+        3.0 * c + 15.0 * d * t + 7.5 * e * (7.0 * t * t - 1.0)
+    }
+
+    /// Mean square of the points' distance, and the weight of the points.
+    fn scatter(&self, points: impl Iterator<Item = Point>) -> (f64, f64) {
+        let (mut sum, mut n) = (0.0, 0.0);
+        for point in points {
+            let off = point.u - self.at(point.t);
+            sum += point.weight * off * off;
+            n += point.weight;
+        }
+        (sum / f64::max(n, 1e-9), n)
+    }
+}
+
+fn legendre(t: f64) -> [f64; MOST] {
+    let s = t * t;
+    [
+        1.0,
+        t,
+        1.5 * s - 0.5,
+        t * (2.5 * s - 1.5),
+        (35.0 * s - 30.0) * s / 8.0 + 0.375,
+    ]
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a small number")]
+fn float(number: usize) -> f64 {
+    number as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(of: impl Fn(f64) -> f64) -> Vec<Point> {
+        (0..40u8)
+            .map(|k| (f64::from(k) + 0.5) / 20.0 - 1.0)
+            .map(|t| Point { t, u: of(t), weight: 1.0 })
+            .collect()
+    }
+
+    #[test]
+    fn a_parabola_comes_back_even_through_a_gap() {
+        let of = |t: f64| 100.0 + 8.0 * t - 3.0 * t * t;
+        let mut points = points(of);
+        points.drain(10..22);
+        let curve = Curve::fit(points.iter().copied()).unwrap();
+        for t in [-1.0, -0.3, 0.0, 0.9] {
+            assert!((curve.at(t) - of(t)).abs() < 1e-9);
+            assert!((curve.slope(t) - (8.0 - 6.0 * t)).abs() < 1e-8);
+        }
+        assert!((curve.terms[0] - 99.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_bends_more_is_followed_when_that_explains_it() {
+        let of = |t: f64| 100.0 + 6.0 * (t * t * t - t) + 4.0 * t.powi(4);
+        let curve = Curve::fit(points(of).into_iter()).unwrap();
+        assert!((curve.at(0.4) - of(0.4)).abs() < 1e-9);
+        let slope = (curve.at(0.4 + 1e-5) - curve.at(0.4 - 1e-5)) / 2e-5;
+        assert!((curve.slope(0.4) - slope).abs() < 1e-6);
+    }
+
+    #[test]
+    fn one_point_is_no_curve() {
+        assert_eq!(Curve::fit(points(|t| t).into_iter().take(1)), None);
+    }
+}

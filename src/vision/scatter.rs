@@ -1,0 +1,123 @@
+//! How far the places of an edge scatter about its course, and over how many
+//! bands that hangs together.
+
+/// Weights of a parabola through nine neighbours at the middle one, over 231.
+const SMOOTHER: [f64; 9] = [-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0];
+const HALF: usize = 4;
+/// Excess that is believed, in standard deviations of its own doubt.
+const BELIEVED: f64 = 2.5;
+
+/// By how much the variance of the mean of an edge's places is larger than
+/// that of independent ones: from what is left of them when a parabola through
+/// nine neighbours, the bead's own shape, is taken off, and from its
+/// correlation over neighbours. `variance` is what noise explains of a place;
+/// at least 1.
+pub fn inflation(places: &[Option<f64>], variance: f64, memory: &mut Vec<f64>) -> f64 {
+    memory.clear();
+    memory.extend(places.windows(2 * HALF + 1).filter_map(left_over));
+    let n = float(memory.len());
+    if memory.len() < 2 * HALF || variance <= 0.0 {
+        return 1.0;
+    }
+    let product = |lag: usize| -> f64 {
+        let pairs = memory.iter().zip(&memory[lag..]);
+        pairs.map(|(a, b)| a * b).sum::<f64>() / (n - float(lag))
+    };
+    let passed = [passes(0), passes(1), passes(2)];
+    let (same, next) = (product(0), product(1));
+    let ratio = same / (passed[0] * variance);
+    // The products of what is left hang together over a few neighbours, so
+    // that there are fewer of them than it seems.
+    let doubt = (2.0 * 1.43 / n).sqrt();
+    if ratio < 1.0 + BELIEVED * doubt {
+        return 1.0;
+    }
+    // Covariance of a place with itself and with the next, before the
+    // parabola was taken off: same = p₀c₀ + 2p₁c₁, next = p₁c₀ + (p₀ + p₂)c₁.
+    let (a, b, c, d) = (passed[0], 2.0 * passed[1], passed[1], passed[0] + passed[2]);
+    let under = a * d - b * c;
+    let (itself, with_next) = ((d * same - b * next) / under, (a * next - c * same) / under);
+    ((itself + 2.0 * with_next.max(0.0)) / variance).max(ratio)
+}
+
+/// What the parabola leaves of the middle place; `None` where one is missing.
+fn left_over(places: &[Option<f64>]) -> Option<f64> {
+    let mut smooth = 0.0;
+    for (place, weight) in places.iter().zip(SMOOTHER) {
+        smooth += weight / 231.0 * (*place)?;
+    }
+    Some(places[HALF]? - smooth)
+}
+
+/// What is left of independent places of variance 1, times itself or what is
+/// left so many places on.
+fn passes(lag: usize) -> f64 {
+    let left = |k: usize| f64::from(u8::from(k == HALF)) - SMOOTHER[k] / 231.0;
+    (0..SMOOTHER.len() - lag).map(|k| left(k) * left(k + lag)).sum()
+}
+
+/// Variance of values about zero, times the number of neighbours over which
+/// they are correlated (the integrated autocorrelation up to its first zero),
+/// so that it may be used as if they were independent.
+pub fn correlated_variance(values: &[f64]) -> f64 {
+    let square: f64 = values.iter().map(|value| value * value).sum();
+    if square <= 0.0 {
+        return 0.0;
+    }
+    let mut time = 1.0;
+    for lag in 1..values.len() / 2 {
+        let product: f64 = values.iter().zip(&values[lag..]).map(|(a, b)| a * b).sum();
+        if product <= 0.0 {
+            break;
+        }
+        time += 2.0 * product / square;
+    }
+    square / (float(values.len()) - 3.0).max(1.0) * time
+}
+
+#[expect(clippy::cast_precision_loss, reason = "there are few bands")]
+fn float(number: usize) -> f64 {
+    number as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn white(seed: u64, n: usize) -> Vec<f64> {
+        let mut random = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
+        (0..n).map(|_| StandardNormal.sample(&mut random)).collect()
+    }
+
+    fn found(values: &[f64]) -> f64 {
+        let places: Vec<Option<f64>> = values.iter().copied().map(Some).collect();
+        inflation(&places, 1.0, &mut Vec::new())
+    }
+
+    #[test]
+    fn independent_places_and_the_shape_of_the_bead_are_not_inflated() {
+        for n in [25, 64] {
+            let inflated = (0..200).filter(|&seed| found(&white(seed, n)) > 1.0).count();
+            assert!(inflated <= 6, "{inflated}");
+        }
+        let mut wavy = white(7, 64);
+        for (k, value) in wavy.iter_mut().enumerate() {
+            *value += 8.0 * (float(k) / 8.0).sin();
+        }
+        assert_eq!(found(&wavy), 1.0);
+    }
+
+    #[test]
+    fn what_hangs_together_counts_for_less() {
+        // The mean of neighbours: twice the variance of the mean of all.
+        let of = |seed| {
+            let white = white(seed, 401);
+            let pairs: Vec<f64> = white.windows(2).map(|pair| pair[0] + pair[1]).collect();
+            found(&pairs)
+        };
+        let mean = (0..20).map(of).sum::<f64>() / 20.0;
+        assert!((mean / 4.0 - 1.0).abs() < 0.25, "{mean}");
+    }
+}
