@@ -5,7 +5,7 @@ use super::trace::Located;
 /// Distances at which neighbours are asked.
 const SPANS: [usize; 3] = [1, 2, 3];
 /// Least deviation that makes an outlier \[px\].
-const LEAST_PX: f64 = 0.75;
+const LEAST_PX: f64 = 0.3;
 /// Deviation that makes an outlier, in robust standard deviations.
 const MANY_SIGMA: f64 = 5.0;
 

@@ -253,7 +253,7 @@ impl Overlay {
         let notable = (5.0 * noise).max(0.06 / start.blur.max(1.0));
         let cut = |sign: f64, room: f64| {
             let mut lowest = (f64::INFINITY, 0.0);
-            let mut away = (1.2 * start.blur).max(1.0);
+            let mut away = (0.5 * start.blur).clamp(0.5, 3.0);
             while away < room - 1.0 {
                 let slope = self.slope(((start.at + sign * away) * 2.0).round() / 2.0).abs();
                 if slope < lowest.0 {

@@ -7,8 +7,8 @@ use super::contour::{Contour, Contours};
 /// Depth of a gap between two edges, as a share of their step, that shows them
 /// to belong to two beads.
 const GAP_SHARE: f32 = 0.5;
-/// Wobble above which a contour is no edge that could bound a gap \[px\].
-const SMOOTH_PX: f32 = 1.2;
+/// Share of the bands in which a gap is seen, in that of the bead's edges.
+const WHOLE: f64 = 0.85;
 
 /// What pairs are looked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +52,7 @@ pub fn find(
             let shares = (edge.share * other.share) as f32;
             let score = step * shares / ((1.0 + edge.wobble) * (1.0 + other.wobble)).sqrt();
             if best.is_some_and(|best| best.score >= score)
-                || gap(lefts, rights, (edge, other), memory) > GAP_SHARE * step
+                || gap(lefts, rights, (edge, other)) > GAP_SHARE * step
             {
                 continue;
             }
@@ -77,28 +77,34 @@ fn distance(left: &Contour, right: &Contour, memory: &mut Vec<f32>) -> Option<f3
 }
 
 /// Depth of the deepest gap between two edges: a contour out of the bead,
-/// followed by one back in.
-fn gap(
-    lefts: &Contours,
-    rights: &Contours,
-    (left, right): (&Contour, &Contour),
-    memory: &mut Vec<f32>,
-) -> f32 {
+/// followed by one back in, both about as whole as the edges are.
+fn gap(lefts: &Contours, rights: &Contours, (left, right): (&Contour, &Contour)) -> f32 {
+    let whole = WHOLE * left.share.min(right.share);
     let mut deepest: f32 = 0.0;
-    let smooth = |contour: &&Contour| contour.wobble <= SMOOTH_PX;
-    for out in rights.all().iter().filter(smooth) {
-        if distance(left, out, memory).is_none() || distance(out, right, memory).is_none() {
+    for out in rights.all().iter().filter(|out| out.share >= whole) {
+        if !in_order(left, out) || !in_order(out, right) {
             continue;
         }
-        for back in lefts.all().iter().filter(smooth) {
-            let between =
-                distance(out, back, memory).is_some() && distance(back, right, memory).is_some();
-            if between {
+        for back in lefts.all().iter().filter(|back| back.share >= whole) {
+            if in_order(out, back) && in_order(back, right) {
                 deepest = deepest.max(out.step.min(back.step));
             }
         }
     }
     deepest
+}
+
+/// Whether one contour runs to the left of another wherever both are seen,
+/// which must be in most bands.
+fn in_order(left: &Contour, right: &Contour) -> bool {
+    let (mut both, mut ordered) = (0, 0);
+    for (left, right) in left.at.iter().zip(&right.at) {
+        if let (Some(left), Some(right)) = (left, right) {
+            both += 1;
+            ordered += usize::from(left < right);
+        }
+    }
+    2 * both >= left.at.len() && 20 * ordered >= 19 * both
 }
 
 #[cfg(test)]

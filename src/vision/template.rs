@@ -76,6 +76,8 @@ pub struct RowSums {
     pub before: f32,
     /// Residual times the share after it.
     pub after: f32,
+    /// Pixels that lie too far off to be noise; they count as fitting.
+    pub wild: f32,
 }
 
 /// Plain pixels that count and their residuals, over several rows, lane by
@@ -110,6 +112,9 @@ pub struct Expected {
     /// Plain pixels farther from their level are grains or sparks
     /// \[grey levels\].
     pub tolerance: f32,
+    /// The same for pixels of the step, where the place may be off a little
+    /// \[grey levels\].
+    pub tolerance_at_step: f32,
 }
 
 impl Default for Template {
@@ -201,10 +206,13 @@ impl Template {
         let (core, after) = rest.split_at(self.core.len());
         let (pixels_before, rest) = pixels.split_at(before.len() * LANES);
         let (pixels_core, pixels_after) = rest.split_at(core.len() * LANES);
-        let mut lanes = [[0.0f32; LANES]; 4];
+        let mut lanes = [[0.0f32; LANES]; 5];
         for (part, pixels) in core.iter().zip(pixels_core.chunks_exact(LANES)) {
             for k in 0..LANES {
                 let miss = residual(part, k, pixels[k], scale, expected) * part.mask[k];
+                let wild = if miss.abs() > expected.tolerance_at_step { 1.0 } else { 0.0 };
+                let miss = miss * (1.0 - wild);
+                lanes[4][k] += wild;
                 lanes[0][k] += miss * part.slope[k];
                 lanes[1][k] += miss * miss;
                 lanes[2][k] += miss;
@@ -215,6 +223,7 @@ impl Template {
         sums.squares = total(&lanes[1]);
         sums.after = total(&lanes[3]);
         sums.before = total(&lanes[2]) - sums.after;
+        sums.wild = total(&lanes[4]);
         add_plain(before, pixels_before, scale, expected, &mut plain.before);
         add_plain(after, pixels_after, scale, expected, &mut plain.after);
         sums

@@ -23,6 +23,10 @@ const MANY_SIGMA: f32 = 4.5;
 const UNLIKE: f32 = 2.5;
 /// Rows of a band may differ by this much beside their noise \[px\].
 const WAVY_PX: f32 = 0.5;
+/// Wild pixels that a row may have; more are a grain.
+const FEW_WILD: f32 = 2.0;
+/// Share of its rows that a band must have left to count.
+const LEAST_SHARE: f64 = 0.5;
 /// Where levels are picked first: distance from the edge, and apart \[px\].
 const PICK: (f32, f32) = (5.0, 3.0);
 /// Extra deviation of levels that is believed, in standard deviations of its
@@ -241,7 +245,8 @@ impl Tracer {
                 let [at, before, step] = self.rows.of(v);
                 let at = Template::sampled(at);
                 let tolerance = MANY_SIGMA * scene.noise + 0.05 * step.abs();
-                let expected = Expected { at, before, step, tolerance };
+                let tolerance_at_step = MANY_SIGMA * scene.noise + 0.15 * step.abs();
+                let expected = Expected { at, before, step, tolerance, tolerance_at_step };
                 self.sums.push((at, self.template.hold(scene.strip, v, &expected, &mut plain)));
             }
             self.plain.push(plain);
@@ -254,9 +259,13 @@ impl Tracer {
         let products = self.template.products;
         let stiffness = narrow(products.slope_slope);
         self.misfits.clear();
-        self.misfits.extend(
-            self.sums.iter().map(|(_, sums)| sums.squares - sums.slope * sums.slope / stiffness),
-        );
+        self.misfits.extend(self.sums.iter().map(|(_, sums)| {
+            if sums.wild > FEW_WILD {
+                f32::INFINITY
+            } else {
+                sums.squares - sums.slope * sums.slope / stiffness
+            }
+        }));
         self.sorted.clear();
         self.sorted.extend(self.misfits.iter().step_by(self.misfits.len().div_ceil(128)));
         let middle = self.sorted.len() / 2;
@@ -264,10 +273,23 @@ impl Tracer {
         let pixels = narrow(products.pixels);
         let noise = scene.noise * scene.noise * (pixels + MANY_SIGMA * (2.0 * pixels).sqrt());
         let limit = noise.max(UNLIKE * median);
+        self.spread_misfits(limit);
         self.solved.clear();
         for band in 0..scene.bands.count() {
             let sums = self.gather_band(scene, band, limit, &products.matrix());
             self.solved.push(sums);
+        }
+    }
+
+    /// Rows next to one that fits badly share its grain or spark.
+    fn spread_misfits(&mut self, limit: f32) {
+        self.sorted.clear();
+        self.sorted.extend_from_slice(&self.misfits);
+        let rows = self.misfits.len();
+        for (v, _) in self.sorted.iter().enumerate().filter(|(_, misfit)| **misfit > limit) {
+            for beside in v.saturating_sub(1)..(v + 2).min(rows) {
+                self.misfits[beside] = self.misfits[beside].max(self.sorted[v]);
+            }
         }
     }
 
@@ -381,7 +403,7 @@ impl BandSums {
     /// Place relative to the path and what is known of it; `None` without a
     /// row or an edge.
     fn solve(&self, core: Matrix3<f64>, variance: f64, extra: [f64; 2]) -> Option<(f64, Located)> {
-        if self.rows < 1.0 {
+        if self.rows < LEAST_SHARE * self.all_rows {
             return None;
         }
         let mut matrix = core * self.rows;
