@@ -8,7 +8,7 @@ mod video;
 
 pub use board::find_board;
 pub use camera::{BoardView, CameraFit, calibrate_camera, solve_pose};
-pub use lines::{EdgeSettings, Segment, canny_hough};
+pub use lines::{EdgeSettings, LineFinder, Segment, canny_hough};
 pub use video::{VideoInput, VideoReader};
 
 use std::sync::Once;
