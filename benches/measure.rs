@@ -178,7 +178,9 @@ impl<'a> Contest<'a> {
             times.copy.push(self.copy());
         }
         let Times { measure, copy, lines } = &mut times;
-        [measure, copy, lines].into_iter().for_each(|list| list.sort_by(f64::total_cmp));
+        for list in [measure, copy, lines] {
+            list.sort_by(f64::total_cmp);
+        }
         times
     }
 }

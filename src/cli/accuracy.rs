@@ -27,13 +27,15 @@ Example:
 
 Every set is rendered and measured like the frames of a cell with defaults.
 Silent: widths that are more than half a pixel off, as a share of all frames.
-Bound: the smallest standard deviation that a width can have in a picture that
-nothing disturbs. The status is 1 where a set with limits misses them.")]
+Bound: the smallest standard deviation that the width of a straight bead can
+have in a picture that nothing disturbs; free bound: the same where its
+direction is not known. The last column names the limits that are missed; the
+status is 1 where there are any. ACCURACY.md says what every set is.")]
 pub struct AccuracyArgs {
-    /// Frames of each set that nothing disturbs
+    /// Frames of each set
     #[arg(long, value_name = "N", default_value = "3000", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     frames: u64,
-    /// Frames of each disturbed set
+    /// Frames of each set whose silently wrong widths are limited
     #[arg(long, value_name = "M", default_value = "30000", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     silent_frames: u64,
     /// Only this set; may be given more than once
@@ -50,7 +52,7 @@ pub fn run(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
     if let Some(out) = &args.out {
         output::make_folder(out)?;
     }
-    let count = |set: &Set| if set.disturbed { args.silent_frames } else { args.frames };
+    let count = |set: &Set| if set.limits_silent() { args.silent_frames } else { args.frames };
     let total = sets.iter().map(count).sum();
     let progress = Mutex::new(Progress::new("measuring", "frames", Some(total), voice.quiet));
     let figures: Result<Vec<SetFigures>> =

@@ -226,7 +226,7 @@ fn read_shadow(table: &Table<'_>) -> Option<Shadow> {
     let usual = Picture::USUAL.shadow;
     let distance = table.number_or("shadow_px", 0.0..=1000.0, usual.distance_px);
     let width = table.number_or("shadow_width_px", 0.0..=1000.0, usual.width_px);
-    let share = table.number_or("shadow_share", 0.0..=2.0, usual.share);
+    let share = table.number_or("shadow_share", -2.0..=2.0, usual.share);
     let side = table.choice("shadow_side", &LEFT_FIRST);
     Some(Shadow { distance_px: distance?, width_px: width?, share: share?, side: side? })
 }

@@ -115,7 +115,7 @@ pub struct Shadow {
     /// Width \[px\].
     pub width_px: f64,
     /// How much darker than the ground it is – brighter beside a dark bead –,
-    /// as a share of the bead's contrast.
+    /// as a share of the bead's contrast; negative for the opposite.
     pub share: f64,
     /// The edges.
     pub side: Side,

@@ -1,19 +1,22 @@
 //! Named sets of pictures whose truth is known: what the measurement is judged
 //! by.
 
+mod limits;
+mod list;
+
 use super::bead::Roughness;
-use super::picture::{Bend, Grains, Motion, Neighbour, Picture, Shading, Shadow, Side, Texture};
+use super::picture::Picture;
 use crate::geometry::Roi;
 use crate::units::Mm;
 use crate::vision::{Axis, Gauge, Method, Polarity};
 
+pub use limits::Limits;
+pub use list::all;
+
 /// Scale of all sets without a camera model, that of the 2022 paper.
 pub const MM_PER_PX: f64 = 0.126_582;
-const WIDE_MM: f64 = 42.0;
-const NARROW_MM: f64 = 12.7;
-const SMOOTH: Roughness = Roughness { size_mm: 0.0, length_mm: 5.0 };
-/// Contrast 80, blur 1.5 px, noise 4, even light.
-const PLAIN: Picture = Picture { light_ratio: 1.0, ..Picture::USUAL };
+/// The gauge's extent across the bead, and that of the picture \[px\].
+const ACROSS: (usize, u32) = (640, 720);
 
 /// Pictures of one kind.
 #[derive(Debug, Clone)]
@@ -22,174 +25,98 @@ pub struct Set {
     pub name: &'static str,
     /// How the bead is pictured; the size is that of the set.
     pub picture: Picture,
-    /// Rows of the gauge.
+    /// Rows of the gauge; of a horizontal bead columns.
     pub rows: u32,
     /// Width of the bead in the mean \[mm\].
     pub width_mm: f64,
     /// Roughness of its edges.
     pub roughness: Roughness,
+    /// How it runs in the picture.
+    pub axis: Axis,
+    /// The bead against its surroundings.
+    pub polarity: Polarity,
     /// Seen by a tilted camera through a lens with distortion.
     pub tilted: bool,
-    /// Something disturbs the picture, so that a width may be silently wrong.
-    pub disturbed: bool,
     /// What the measurement must reach.
     pub limits: Limits,
 }
 
-/// Largest figures that are borne; `None` bears any.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Limits {
-    /// Magnitude of the mean error \[mm\].
-    pub bias_mm: Option<f64>,
-    /// Root of the mean square of the error \[mm\].
-    pub rmse_mm: Option<f64>,
-}
-
-fn plain(name: &'static str) -> Set {
-    Set {
-        name,
-        picture: PLAIN,
-        rows: 100,
-        width_mm: WIDE_MM,
-        roughness: SMOOTH,
-        tilted: false,
-        disturbed: false,
-        limits: Limits::default(),
-    }
-}
-
-fn slant(name: &'static str, slant_deg: f64, blur_px: f64) -> Set {
-    let picture = Picture { blur_px, slant_deg, ..PLAIN };
-    Set { picture, width_mm: NARROW_MM, ..plain(name) }
-}
-
-fn disturbed(name: &'static str, disturb: impl FnOnce(&mut Picture)) -> Set {
-    let mut set = Set { disturbed: true, ..plain(name) };
-    disturb(&mut set.picture);
-    set
-}
-
-fn bent(name: &'static str, rows: u32, radius_widths: f64, corner_deg: f64) -> Set {
-    let bend = Bend { radius_mm: radius_widths * 100.0 * MM_PER_PX, corner_deg };
-    Set { rows, width_mm: NARROW_MM, ..disturbed(name, |picture| picture.bend = bend) }
-}
-
-/// All sets, in the order in which they are reported.
-pub fn all() -> Vec<Set> {
-    [clean(), lit(), covered(), beside(), odd()].concat()
-}
-
-fn clean() -> Vec<Set> {
-    let blurred = |name, blur_px| Set { picture: Picture { blur_px, ..PLAIN }, ..plain(name) };
-    let faint = Picture { bead_grey: 90.0, blur_px: 2.0, noise_grey: 6.0, ..PLAIN };
-    let rough = Roughness { size_mm: 0.1, length_mm: 5.0 };
-    let limits = Limits { bias_mm: Some(0.005), rmse_mm: Some(0.01) };
-    vec![
-        blurred("blur-0.8", 0.8),
-        blurred("blur-1.5", 1.5),
-        blurred("blur-3", 3.0),
-        slant("slant-7-blur-0.8", 7.0, 0.8),
-        slant("slant-7-blur-1.5", 7.0, 1.5),
-        slant("slant-7-blur-3", 7.0, 3.0),
-        slant("slant-15-blur-0.8", 15.0, 0.8),
-        slant("slant-15-blur-1.5", 15.0, 1.5),
-        slant("slant-15-blur-3", 15.0, 3.0),
-        Set { roughness: rough, ..plain("rough") },
-        Set { picture: faint, ..plain("faint") },
-        Set { rows: 500, width_mm: 37.0, tilted: true, limits, ..plain("tilted") },
-    ]
-}
-
-fn lit() -> Vec<Set> {
-    let shading = Shading { side: Side::Left, ..PLAIN.shading };
-    let light = |direction: f64| {
-        move |picture: &mut Picture| {
-            (picture.light_ratio, picture.light_deg) = (4.0, Some(direction));
-        }
-    };
-    let saturated = |bead_grey: f64| {
-        move |picture: &mut Picture| (picture.bead_grey, picture.ground_grey) = (bead_grey, 175.0)
-    };
-    vec![
-        disturbed("shading-bead", |picture| {
-            picture.shading = Shading { bead_grey_per_px: 1.0, ..shading };
-        }),
-        disturbed("shading-ground", |picture| {
-            picture.shading = Shading { ground_grey_per_px: 1.0, ..shading };
-        }),
-        disturbed("light-across", light(0.0)),
-        disturbed("light-along", light(90.0)),
-        disturbed("saturated-255", saturated(255.0)),
-        disturbed("saturated-300", saturated(300.0)),
-    ]
-}
-
-fn covered() -> Vec<Set> {
-    let grains = |size_px: f64, grey: f64| {
-        move |picture: &mut Picture| picture.grains = Grains { rows_share: 0.3, size_px, grey }
-    };
-    vec![
-        disturbed("spots", |picture| picture.spots.share = 0.05),
-        disturbed("grains-6-bright", grains(6.0, 230.0)),
-        disturbed("grains-6-dark", grains(6.0, 20.0)),
-        disturbed("grains-12-bright", grains(12.0, 230.0)),
-        disturbed("grains-12-dark", grains(12.0, 20.0)),
-    ]
-}
-
-fn beside() -> Vec<Set> {
-    let shadow = |distance_px: f64| {
-        let shadow = Shadow { distance_px, width_px: 20.0, share: 0.7, side: Side::Left };
-        move |picture: &mut Picture| picture.shadow = shadow
-    };
-    let neighbour = Neighbour { gap_px: 20.0, share: 0.6, ..PLAIN.neighbour };
-    vec![
-        disturbed("shadow-6", shadow(6.0)),
-        disturbed("shadow-10", shadow(10.0)),
-        disturbed("older-bead", |picture| picture.neighbour = neighbour),
-    ]
-}
-
-fn odd() -> Vec<Set> {
-    let layer = disturbed("layer-on-layer", |picture| {
-        (picture.bead_grey, picture.noise_grey) = (82.0, 2.0);
-        picture.texture = Texture { size_grey: 2.0, length_px: 4.0 };
-    });
-    vec![
-        disturbed("motion", |picture| {
-            picture.motion = Motion { length_px: 6.0, direction_deg: 15.0 };
-        }),
-        Set { rows: 400, ..layer },
-        bent("curve-3-widths", 100, 3.0, 0.0),
-        // The inner edge has a radius of 250 px and a slope of 20 degrees at
-        // the ends of the gauge.
-        bent("curve-3-widths-20-deg", 170, 3.0, 0.0),
-        bent("curve-10-widths", 100, 10.0, 0.0),
-        bent("corner-20", 100, 0.0, 20.0),
-        bent("corner-40", 100, 0.0, 40.0),
-        bent("corner-90", 100, 0.0, 90.0),
-    ]
-}
-
 impl Set {
-    /// Smallest standard deviation that a width can have \[px\]: two edges, each
-    /// known from every row to the Cramér–Rao bound √(2√π)·(σ/A)·√s of the
-    /// place of a step A that is blurred with s, in white noise σ.
+    /// Smallest standard deviation that the width of a straight bead can have
+    /// \[px\] where its direction is known.
+    ///
+    /// A line across a step of the height A that is blurred with s, in white
+    /// noise σ, tells the step's place with a variance of at least
+    /// 2√π·(σ/A)²·s (Cramér–Rao), whatever else is unknown of the step's
+    /// levels and blur, which are even about its place. Along a row that cuts
+    /// the edge at the slant t the blur is s/cos t, and what is found along the
+    /// row is cos t as long normal to the edge. From N rows and two edges:
+    ///
+    /// ```text
+    /// var = 2·cos² t·e²/N,   e² = 2√π·(σ/A)²·s/cos t
+    /// ```
     pub fn bound_px(&self) -> f64 {
-        let Picture { bead_grey, ground_grey, noise_grey, blur_px, .. } = self.picture;
-        let contrast = (bead_grey - ground_grey).abs();
-        1.883 * noise_grey / contrast * (blur_px * 2.0 / f64::from(self.rows)).sqrt()
+        let cos = libm::cos(self.picture.slant_deg.to_radians());
+        (2.0 * cos * cos * self.row_variance() / f64::from(self.rows)).sqrt()
+    }
+
+    /// The same where the direction has to be found from the same edges.
+    ///
+    /// The width is w = c·cos t with the chord c along a row. Two parallel
+    /// edges x = a + m·v, m = tan t, over the same N rows v give a, and with it
+    /// c, independently of m, and m with the variance e²/(2·Σv²) = 6·e²/N³ for
+    /// v counted from the middle. With dt = cos² t·dm and
+    /// dw = −c·sin t·dt = −w·tan t·dt:
+    ///
+    /// ```text
+    /// var = 2·cos² t·e²/N + (w·tan t)²·cos⁴ t·6·e²/N³
+    /// ```
+    ///
+    /// That is 1 + 3·(w·sin t/N)² times the variance with a known direction, and
+    /// the same for a bead along the gauge.
+    pub fn free_bound_px(&self) -> f64 {
+        let (sin, cos) = libm::sincos(self.picture.slant_deg.to_radians());
+        let rows = f64::from(self.rows);
+        let lever = self.width_mm / MM_PER_PX * sin / cos;
+        let direction = cos.powi(4) * 6.0 * self.row_variance() / rows.powi(3);
+        (self.bound_px().powi(2) + lever * lever * direction).sqrt()
+    }
+
+    /// Smallest variance of an edge's place along a row e² \[px²\].
+    fn row_variance(&self) -> f64 {
+        let Picture { bead_grey, ground_grey, noise_grey, blur_px, slant_deg, .. } = self.picture;
+        let share = noise_grey / (bead_grey - ground_grey);
+        let along_row = blur_px / libm::cos(slant_deg.to_radians());
+        2.0 * std::f64::consts::PI.sqrt() * share * share * along_row
+    }
+
+    /// Whether silently wrong widths are limited, for which many frames are
+    /// needed.
+    pub fn limits_silent(&self) -> bool {
+        self.limits.silent_share.is_some()
+    }
+
+    /// Size of the pictures \[px\], where no camera model sets it.
+    pub fn size_px(&self) -> [u32; 2] {
+        match self.axis {
+            Axis::Vertical => [ACROSS.1, self.rows + 20],
+            Axis::Horizontal => [self.rows + 20, ACROSS.1],
+        }
     }
 
     /// The gauge of a cell with defaults.
     pub fn gauge(&self) -> Gauge {
         let rows = usize::try_from(self.rows).unwrap_or(usize::MAX);
-        let y = if self.tilted { 20 } else { 10 };
+        let first = if self.tilted { 20 } else { 10 };
+        let roi = match self.axis {
+            Axis::Vertical => Roi { x: 40, y: first, width: ACROSS.0, height: rows },
+            Axis::Horizontal => Roi { x: first, y: 40, width: rows, height: ACROSS.0 },
+        };
         let range = if self.width_mm < 20.0 { [5.0, 25.0] } else { [20.0, 60.0] };
         Gauge {
-            roi: Roi { x: 40, y, width: 640, height: rows },
-            axis: Axis::Vertical,
-            polarity: Polarity::Bright,
+            roi,
+            axis: self.axis,
+            polarity: self.polarity,
             width_range: (Mm::constant(range[0]), Mm::constant(range[1])),
             method: Method::Caliper,
             calipers: 64,
@@ -203,16 +130,48 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
+    fn set(name: &str) -> Set {
+        all().into_iter().find(|set| set.name == name).unwrap()
+    }
+
     #[test]
-    fn every_set_has_a_name_of_its_own() {
+    fn every_set_has_a_name_and_limits_of_its_own() {
         let sets = all();
         let names: BTreeSet<&str> = sets.iter().map(|set| set.name).collect();
         assert_eq!(names.len(), sets.len());
+        assert!(sets.iter().all(|set| set.limits != Limits::default()));
     }
 
     #[test]
     fn the_bound_of_a_plain_set_is_that_of_two_edges() {
-        let bound = plain("plain").bound_px();
-        assert!((bound - 1.883 * 0.05 * 1.5_f64.sqrt() * 0.02_f64.sqrt()).abs() < 1e-12);
+        for name in ["blur-1.5", "horizontal", "dark-bead"] {
+            let bound = set(name).bound_px();
+            assert!(
+                (bound / (1.8827 * 0.05 * 1.5_f64.sqrt() * 0.02_f64.sqrt()) - 1.0).abs() < 1e-4
+            );
+            assert_eq!(set(name).free_bound_px(), bound);
+        }
+    }
+
+    /// Against the information matrix of both edges' places and the common
+    /// slope, row by row.
+    #[test]
+    fn the_bound_for_an_unknown_direction_is_that_of_a_straight_fit() {
+        let set = set("slant-15-blur-1.5");
+        let (sin, cos) = 15_f64.to_radians().sin_cos();
+        let variance = 1.8827_f64.powi(2) * 0.05_f64.powi(2) * 1.5 / cos;
+        let mut information = nalgebra::Matrix3::<f64>::zeros();
+        for row in 0..100 {
+            let v = f64::from(row) - 20.0;
+            for edge in [nalgebra::Vector3::new(1.0, 0.0, v), nalgebra::Vector3::new(0.0, 1.0, v)] {
+                information += edge * edge.transpose() / variance;
+            }
+        }
+        let chord = set.width_mm / MM_PER_PX / cos;
+        // Of (right − left)·cos(atan m) by left, right and m.
+        let by = nalgebra::Vector3::new(-cos, cos, -chord * sin * cos * cos);
+        let bound = (by.transpose() * information.try_inverse().unwrap() * by)[0].sqrt();
+        assert!((set.free_bound_px() / bound - 1.0).abs() < 1e-3, "{bound}");
+        assert!(set.free_bound_px() > 1.05 * set.bound_px());
     }
 }

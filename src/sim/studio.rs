@@ -42,7 +42,7 @@ impl Studio {
         let gauge = set.gauge();
         let surface = calibration.surface(height, None);
         let seed = hash::mix(&set.name.bytes().map(u64::from).collect::<Vec<_>>());
-        let picture = Picture { size_px: [720, set.rows + 20], ..set.picture };
+        let picture = Picture { size_px: set.size_px(), ..set.picture };
         let mm_per_px =
             surface.mm_per_px(gauge_middle(&gauge.roi)).map_or(MM_PER_PX, |mm| mm.column(0).norm());
         let renderer = Renderer::new(calibration, height, gauge, picture, seed)?;
@@ -107,9 +107,9 @@ mod tests {
         for set in all() {
             let studio = Studio::new(&set).unwrap();
             let (first, second) = (studio.take(0).unwrap(), studio.take(1).unwrap());
-            let rows = usize::try_from(set.rows).unwrap();
-            let size = if set.tilted { (720, 540) } else { (720, rows + 20) };
-            assert_eq!(first.frame.size(), size);
+            let size = if set.tilted { [720, 540] } else { set.size_px() };
+            let size = size.map(|side| usize::try_from(side).unwrap());
+            assert_eq!(first.frame.size(), size.into());
             assert_eq!(studio.take(0).unwrap(), first);
             let truths = [&first, &second].map(|rendered| rendered.truth.unwrap());
             assert_ne!(truths[0].width_mm, truths[1].width_mm);
