@@ -3,22 +3,37 @@
 //! [`Measurer`] has seen its first frame.
 //!
 //! ```text
-//! pool    rows → bands, one averaged profile each
-//! edge    profile → the strongest steps
-//! pair    steps → the chain of pairs that runs along the bead
-//! refine  chain → sub-pixel edges (step, fit, blur)
-//! outlier edges that disagree with their neighbours
-//! axis    edges → width normal to the bead, on the surface
+//! strip    frame → rows across the bead
+//! noise    rows → what a pixel's noise is
+//! pool     rows → bands, a profile of a few rows each
+//! edge     profile → the strongest steps
+//! contour  steps → edges that run along the bead
+//! pair     contours → the two edges of the bead
+//! trace    contour → sub-pixel places, one a caliper line, from all rows:
+//!          path, overlay (blur, surroundings), template, bands
+//! refine   the same for edges that are no blurred steps (fit, blur)
+//! outlier  places that disagree with their neighbours
+//! axis     places → width normal to the bead, on the surface (curve, scatter)
 //! ```
+//!
+//! The loops over pixels are compiled once for each width of vectors that
+//! processors have, and the widest that there is runs.
 //!
 //! [`Method::EdgeLines`] is the method of the 2022 paper instead, as a
 //! baseline.
 
+#![expect(
+    clippy::inline_always,
+    reason = "a loop takes part in the choice of vectors only where it is inlined into it"
+)]
+
 mod axis;
+mod blur;
 mod contour;
 mod curve;
 mod edge;
 mod edge_lines;
+mod fit;
 pub mod gauge;
 mod measure;
 mod noise;
@@ -27,6 +42,7 @@ mod overlay;
 mod pair;
 mod path;
 mod pool;
+mod refine;
 pub mod reject;
 mod scatter;
 mod step;

@@ -84,8 +84,8 @@ pub fn width(
     let slant_rad = scene.slant(&curves)?;
     let sections = Sections::cut(scene, &curves).ok_or(Reject::OffSurface)?;
     scene.check_width(sections.mean)?;
-    for side in 0..2 {
-        scene.lay_off(side, &curves[side], &mut memory.off[side]);
+    for (side, (curve, off)) in curves.iter().zip(&mut memory.off).enumerate() {
+        scene.lay_off(side, curve, off);
     }
     let spread = Spread::of(scene, &curves, &sections, memory);
     let edge = |side: usize| {
@@ -270,13 +270,16 @@ impl Sections {
         let middles = [scene.on_surface(&curves[0], 0.0)?, scene.on_surface(&curves[1], 0.0)?];
         let across = (middles[1] - middles[0]).try_normalize(1e-12)?;
         let slope = |side: usize| -> Option<Vector2<f64>> {
-            Some(scene.on_surface(&curves[side], BESIDE)? - scene.on_surface(&curves[side], -BESIDE)?)
+            Some(
+                scene.on_surface(&curves[side], BESIDE)?
+                    - scene.on_surface(&curves[side], -BESIDE)?,
+            )
         };
         let axis = (slope(0)? + slope(1)?).try_normalize(1e-12)?;
         let normal = Vector2::new(-axis.y, axis.x);
         let normal = if normal.dot(&across) < 0.0 { -normal } else { normal };
-        for side in 0..2 {
-            let (u, v) = (curves[side].at(0.0), scene.centre());
+        for (side, curve) in curves.iter().enumerate() {
+            let (u, v) = (curve.at(0.0), scene.centre());
             let beside = scene.surface.to_mm(scene.view.to_image(u + 1.0, v))?;
             self.scales[side] = (beside - middles[side]).dot(&normal).abs();
         }
@@ -303,12 +306,12 @@ impl Spread {
         memory: &mut Memory,
     ) -> Self {
         let (mut variance, mut noise) = (0.0, 0.0);
-        for side in 0..2 {
+        for (side, curve) in curves.iter().enumerate() {
             let per_place = mean_variance(scene.sides[side].places);
             let off = &memory.off[side];
             let inflation = scatter::inflation(off, per_place, &mut memory.values);
             let scale = sections.scales[side] * sections.scales[side];
-            let of_mean = per_place * inflation * curves[side].mean_variance;
+            let of_mean = per_place * inflation * curve.mean_variance;
             variance += scale * (of_mean + scene.sides[side].common_variance);
             noise += scale * per_place * inflation;
         }

@@ -81,11 +81,7 @@ impl Contours {
     }
 
     /// A strong but not extreme step: the 70th percentile of each band's best.
-    fn typical_step<'a>(
-        &mut self,
-        bands: usize,
-        steps: &impl Fn(usize) -> &'a [Candidate],
-    ) -> f32 {
+    fn typical_step<'a>(&mut self, bands: usize, steps: &impl Fn(usize) -> &'a [Candidate]) -> f32 {
         self.steps.clear();
         for band in 0..bands {
             let free = steps(band).iter().enumerate();
@@ -189,9 +185,9 @@ impl Contours {
 
 fn wobble(at: &[Option<f32>], memory: &mut Vec<f32>) -> f32 {
     memory.clear();
-    memory.extend(at.windows(3).filter_map(|three| {
-        Some((three[1]? - 0.5 * (three[0]? + three[2]?)).abs())
-    }));
+    memory.extend(
+        at.windows(3).filter_map(|three| Some((three[1]? - 0.5 * (three[0]? + three[2]?)).abs())),
+    );
     if memory.is_empty() {
         return f32::INFINITY;
     }
@@ -225,7 +221,9 @@ mod tests {
     #[test]
     fn a_contour_follows_the_edge_and_skips_what_is_hidden() {
         let bands: Vec<Candidates> = (0..20u8)
-            .map(|k| if k == 7 || k == 8 { band(&[]) } else { band(&[(60.0 + f32::from(k), 80.0)]) })
+            .map(
+                |k| if k == 7 || k == 8 { band(&[]) } else { band(&[(60.0 + f32::from(k), 80.0)]) },
+            )
             .collect();
         let found = search(&bands);
         assert_eq!(found.all().len(), 1);

@@ -92,8 +92,12 @@ impl Curve {
 
     /// Change of the position at a place, for a step of 1 in t \[px\].
     pub fn slope(&self, t: f64) -> f64 {
-        let [_, b, c, d, e] = self.terms;
-        b + 3.0 * c * t + 1.5 * d * (5.0 * t * t - 1.0) + 2.5 * e * t * (7.0 * t * t - 3.0)
+        let terms = &self.terms;
+        let square = t * t;
+        terms[1]
+            + 3.0 * terms[2] * t
+            + 1.5 * terms[3] * (5.0 * square - 1.0)
+            + 2.5 * terms[4] * t * (7.0 * square - 3.0)
     }
 
     /// Second derivative at a place \[px\].
@@ -116,13 +120,7 @@ impl Curve {
 
 fn legendre(t: f64) -> [f64; MOST] {
     let s = t * t;
-    [
-        1.0,
-        t,
-        1.5 * s - 0.5,
-        t * (2.5 * s - 1.5),
-        (35.0 * s - 30.0) * s / 8.0 + 0.375,
-    ]
+    [1.0, t, 1.5 * s - 0.5, t * (2.5 * s - 1.5), (35.0 * s - 30.0) * s / 8.0 + 0.375]
 }
 
 #[expect(clippy::cast_precision_loss, reason = "a small number")]

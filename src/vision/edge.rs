@@ -104,12 +104,12 @@ pub fn respond(profile: &[u16], response: &mut [i16]) {
     response[..REACH].fill(0);
     response[length - REACH..].fill(0);
     let part = |offset: usize| &profile[offset..][..span];
-    let (a, b, c, d) = (part(0), part(1), part(2), part(3));
-    let (e, f, g, h) = (part(5), part(6), part(7), part(8));
+    let (b4, b3, b2, b1) = (part(0), part(1), part(2), part(3));
+    let (a1, a2, a3, a4) = (part(5), part(6), part(7), part(8));
     let inner = &mut response[REACH..length - REACH];
     for u in 0..span {
-        let before = (a[u] + b[u]) + (c[u] + d[u]);
-        let after = (e[u] + f[u]) + (g[u] + h[u]);
+        let before = (b1[u] + b2[u]) + (b3[u] + b4[u]);
+        let after = (a1[u] + a2[u]) + (a3[u] + a4[u]);
         // Both fit 15 bits, so that the difference is a signed number of 16.
         inner[u] = after.wrapping_sub(before).cast_signed();
     }

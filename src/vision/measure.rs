@@ -6,14 +6,14 @@ use crate::frame::Frame;
 use crate::geometry::ImagePoint;
 
 use super::axis;
+use super::contour::Contours;
 use super::edge::{Candidates, REACH, respond};
 use super::edge_lines;
 use super::gauge::{Gauge, Method, Polarity};
 use super::noise;
 use super::outlier;
-use super::contour::Contours;
 use super::pair::{self, Pair, Search};
-use super::pool::Bands;
+use super::pool::{self, Bands};
 use super::reject::Reject;
 use super::step::StepTable;
 use super::strip::{Grey, Strip, Strips, Turner, View};
@@ -31,6 +31,19 @@ const MUCH_LIGHT: f64 = 0.3;
 /// Room that a search allows beyond the range of widths, for the difference
 /// between one caliper and the mean of all.
 const RANGE_SLACK: f64 = 1.5;
+/// Misfit of a blurred step from which on, if both have it, edges are located
+/// line by line: one alone is more likely covered than of another kind.
+const STRANGE: f64 = 3.2;
+/// The same for one edge alone.
+const VERY_STRANGE: f64 = 12.0;
+/// Least deviation from its neighbours that makes a caliper an outlier \[px\]:
+/// of one that many rows agree on, and of one that was fitted for itself.
+const OFF_PX: f64 = 0.3;
+const LINE_OFF_PX: f64 = 0.75;
+/// Ground on either side of the bead that its noise is taken from \[px\].
+const BESIDE_PX: f32 = 12.0;
+/// Share by which the blur of one edge differs from the other's.
+const DIFFERENT: f64 = 0.04;
 /// Largest scatter of neighbouring edges about each other \[px\] that still is
 /// an edge, not noise.
 const MAX_SCATTER_PX: f64 = 1.5;
@@ -54,6 +67,7 @@ struct Work {
     gauge: Gauge,
     table: StepTable,
     bands: Bands,
+    lines: Vec<(usize, usize)>,
     noise: f32,
     memory: Vec<f32>,
     response: Vec<i16>,
@@ -62,6 +76,7 @@ struct Work {
     downs: Contours,
     left: Tracer,
     right: Tracer,
+    least_off_px: f64,
     scatter: Vec<f64>,
     middles: Vec<f64>,
     axis: axis::Memory,
@@ -77,6 +92,7 @@ impl Measurer {
             gauge,
             table: StepTable::default(),
             bands: Bands::default(),
+            lines: Vec::new(),
             noise: 0.0,
             memory: Vec::new(),
             response: Vec::new(),
@@ -85,6 +101,7 @@ impl Measurer {
             downs: Contours::default(),
             left: Tracer::default(),
             right: Tracer::default(),
+            least_off_px: OFF_PX,
             scatter: Vec::new(),
             middles: Vec::new(),
             axis: axis::Memory::default(),
@@ -151,8 +168,9 @@ impl Work {
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
         let range = self.search_range(view, surface)?;
-        self.noise = noise::of(strip, &mut self.memory);
+        self.noise = noise::of(strip, 0..strip.across, &mut self.memory);
         self.bands.pool(strip, self.gauge.calipers);
+        pool::cut(strip.along, self.gauge.calipers, &mut self.lines);
         self.find_candidates();
         let pair = self.find_pair(range)?;
         self.trace(strip, pair)?;
@@ -188,17 +206,33 @@ impl Work {
     fn trace<T: Grey>(&mut self, strip: &Strip<'_, T>, pair: Found) -> Result<(), Reject> {
         let (lefts, rights) = pair.sides(&self.ups, &self.downs);
         let (lefts, rights) = (&lefts.all()[pair.pair.left].at, &rights.all()[pair.pair.right].at);
+        let about = about(lefts, rights, strip.across);
+        self.noise = noise::of(strip, about, &mut self.memory);
         let scene = Scene {
             strip,
             bands: &self.bands,
+            lines: &self.lines,
             noise: self.noise,
             width_px: narrowest(lefts, rights, &mut self.memory),
             bead_after: true,
         };
-        let left = self.left.trace(&self.table, &scene, lefts.iter().copied());
-        let scene = Scene { bead_after: false, ..scene };
-        let right = self.right.trace(&self.table, &scene, rights.iter().copied());
-        if left && right { Ok(()) } else { Err(Reject::NoPair { got: 0.0, need: NEED_SHARE }) }
+        let right_scene = Scene { bead_after: false, ..scene };
+        let left = self.left.look(&self.table, &scene, lefts.iter().copied());
+        let right = self.right.look(&self.table, &right_scene, rights.iter().copied());
+        let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
+        if let (Some(left), Some(right)) = (left, right) {
+            let blur = common_blur(left, right);
+            let left = self.left.trace(&self.table, &scene, blur);
+            let right = self.right.trace(&self.table, &right_scene, blur);
+            if left && right && !is_strange([self.left.misfit(), self.right.misfit()]) {
+                self.least_off_px = OFF_PX;
+                return Ok(());
+            }
+        }
+        self.least_off_px = LINE_OFF_PX;
+        let left = self.left.refine(&self.table, &scene);
+        let right = self.right.refine(&self.table, &right_scene);
+        if left && right { Ok(()) } else { Err(failed) }
     }
 
     /// The believed widths in pixels across the gauge's middle.
@@ -227,9 +261,8 @@ impl Work {
         let refused = Reject::NoPair { got, need: NEED_SHARE };
         // A bead of another width deserves to be called that.
         let least = self.gauge.min_contrast_grey;
-        let strong = |found: &Found| {
-            found.pair.share >= NEED_SHARE && f64::from(found.pair.step) >= least
-        };
+        let strong =
+            |found: &Found| found.pair.share >= NEED_SHARE && f64::from(found.pair.step) >= least;
         match self.search((4.0, f32::MAX)).filter(strong) {
             Some(found) => Ok(found),
             None => Err(self.too_much_light().unwrap_or(refused)),
@@ -246,7 +279,7 @@ impl Work {
             }
             let (lefts, rights) =
                 if bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
-            let pair = pair::find(lefts, rights, &search, &mut self.memory);
+            let pair = pair::find(lefts, rights, search, &mut self.memory);
             best = match (best, pair) {
                 (Some(best), Some(pair)) if best.pair.score >= pair.score => Some(best),
                 (best, None) => best,
@@ -265,7 +298,11 @@ impl Work {
     fn sort_out(&mut self) -> Result<(), Reject> {
         let mut worst: f64 = 0.0;
         for side in [&mut self.left, &mut self.right] {
-            worst = worst.max(outlier::sort_out(side.edges_mut(), &mut self.scatter));
+            worst = worst.max(outlier::sort_out(
+                side.edges_mut(),
+                self.least_off_px,
+                &mut self.scatter,
+            ));
         }
         let got = self.left.used_share().min(self.right.used_share());
         if got < NEED_ROWS || worst > MAX_SCATTER_PX {
@@ -305,12 +342,12 @@ impl Work {
             used_share: f64::midpoint(self.left.used_share(), self.right.used_share()),
         };
         self.middles.clear();
-        self.middles.extend((0..self.bands.count()).map(|band| self.bands.middle(band)));
-        for (tracer, points) in
-            [(&self.left, &mut self.left_px), (&self.right, &mut self.right_px)]
+        self.middles.extend(self.lines.iter().map(|&line| pool::middle(line)));
+        for (tracer, points) in [(&self.left, &mut self.left_px), (&self.right, &mut self.right_px)]
         {
             let places = tracer.edges().iter().zip(&self.middles);
-            points.extend(places.filter_map(|(edge, &v)| Some(view.to_image(edge.as_ref()?.at, v))));
+            points
+                .extend(places.filter_map(|(edge, &v)| Some(view.to_image(edge.as_ref()?.at, v))));
         }
         let sides = [&self.left, &self.right].map(|tracer| axis::Side {
             places: tracer.edges(),
@@ -319,6 +356,21 @@ impl Work {
         let (gauge, middles) = (&self.gauge, self.middles.as_slice());
         axis::width(&axis::Scene { view, surface, gauge, middles, sides }, hints, &mut self.axis)
     }
+}
+
+/// Blur that both edges have, seen through one lens, and how far one may differ
+/// from it \[px\], from that of each and its standard deviation.
+fn common_blur(left: (f64, f64), right: (f64, f64)) -> (f64, f64) {
+    let weight = |(blur, sd): (f64, f64)| 1.0 / (sd * sd + (DIFFERENT * blur).powi(2));
+    let (a, b) = (weight(left), weight(right));
+    let blur = (a * left.0 + b * right.0) / (a + b);
+    (blur, DIFFERENT * blur)
+}
+
+/// Whether edges are no blurred steps, from their misfits.
+fn is_strange(misfits: [f64; 2]) -> bool {
+    misfits.iter().all(|&misfit| misfit > STRANGE)
+        || misfits.iter().any(|&misfit| misfit > VERY_STRANGE)
 }
 
 /// A pair and its polarity.
@@ -337,6 +389,19 @@ impl Found {
 
 fn strip_rows(bands: &Bands) -> usize {
     bands.count().checked_sub(1).map_or(0, |last| bands.rows(last).1)
+}
+
+/// Columns of the bead and a little beside it.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "saturates at 0 and is cut to the gauge"
+)]
+fn about(left: &[Option<f32>], right: &[Option<f32>], across: usize) -> std::ops::Range<usize> {
+    let low = left.iter().flatten().fold(f32::INFINITY, |low, &at| low.min(at));
+    let high = right.iter().flatten().fold(0.0, |high: f32, &at| high.max(at));
+    let (from, to) = ((low - BESIDE_PX) as usize, (high + BESIDE_PX) as usize);
+    from.min(across - 1)..to.clamp(from + 1, across)
 }
 
 /// A narrow distance between two contours \[px\], for the size of windows.

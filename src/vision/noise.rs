@@ -1,6 +1,8 @@
 //! Noise of a pixel, from the differences of neighbours along the bead: light,
 //! texture and the bead itself change little from one row to the next.
 
+use std::ops::Range;
+
 use super::strip::{Grey, Strip};
 
 /// Rows and places in each that are looked at.
@@ -16,18 +18,20 @@ const KEPT_VARIANCE: f32 = 0.976;
 /// Rounding to whole levels is noise too.
 const LEAST: f32 = 0.2887;
 
-/// Standard deviation of a pixel \[grey levels of 256\]. `memory` is scratch.
-pub fn of<T: Grey>(strip: &Strip<'_, T>, memory: &mut Vec<f32>) -> f32 {
+/// Standard deviation of a pixel in some columns \[grey levels of 256\].
+/// `memory` is scratch.
+pub fn of<T: Grey>(strip: &Strip<'_, T>, columns: Range<usize>, memory: &mut Vec<f32>) -> f32 {
     memory.clear();
     let room = strip.along.saturating_sub(APART);
-    let (rows, places) = (room.min(ROWS), strip.across.min(PLACES));
+    let across = columns.len();
+    let (rows, places) = (room.min(ROWS), across.min(PLACES));
     for k in 0..rows {
         let v = (2 * k + 1) * room / (2 * rows);
         let (row, other) = (strip.row(v), strip.row(v + APART));
         // Another set of columns in each row, lest a pattern be missed.
-        let first = 7 * k * strip.across / (PLACES * rows);
+        let first = 7 * k * across / (PLACES * rows);
         for j in 0..places {
-            let u = (first + (2 * j + 1) * strip.across / (2 * places)) % strip.across;
+            let u = columns.start + (first + (2 * j + 1) * across / (2 * places)) % across;
             #[expect(clippy::cast_precision_loss, reason = "16 bits fit a float")]
             memory.push(row[u].level().abs_diff(other[u].level()) as f32);
         }
@@ -81,7 +85,7 @@ mod tests {
             let view = View::new(Roi { x: 0, y: 0, width: 300, height: 200 }, Axis::Vertical);
             let mut turner = Turner::default();
             let Strips::Bytes(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
-            let found = f64::from(of(&strip, &mut Vec::new()));
+            let found = f64::from(of(&strip, 0..300, &mut Vec::new()));
             let expected = (sigma * sigma + 1.0 / 12.0).sqrt();
             assert!((found / expected - 1.0).abs() < 0.08, "{sigma}: {found}");
         }

@@ -4,15 +4,13 @@ use super::trace::Located;
 
 /// Distances at which neighbours are asked.
 const SPANS: [usize; 3] = [1, 2, 3];
-/// Least deviation that makes an outlier \[px\].
-const LEAST_PX: f64 = 0.3;
 /// Deviation that makes an outlier, in robust standard deviations.
 const MANY_SIGMA: f64 = 5.0;
 
 /// Removes edges that lie far from the line between their neighbours, and
 /// returns the robust standard deviation of the deviations \[px\]. `memory` is
-/// scratch.
-pub fn sort_out(edges: &mut [Option<Located>], memory: &mut Vec<f64>) -> f64 {
+/// scratch; `least_px` is the least deviation that makes an outlier.
+pub fn sort_out(edges: &mut [Option<Located>], least_px: f64, memory: &mut Vec<f64>) -> f64 {
     memory.clear();
     memory.extend((0..edges.len()).filter_map(|k| deviation(edges, k)).map(f64::abs));
     if memory.is_empty() {
@@ -20,7 +18,7 @@ pub fn sort_out(edges: &mut [Option<Located>], memory: &mut Vec<f64>) -> f64 {
     }
     let middle = memory.len() / 2;
     let sigma = 1.4826 * *memory.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let limit = LEAST_PX.max(MANY_SIGMA * sigma);
+    let limit = least_px.max(MANY_SIGMA * sigma);
     memory.clear();
     memory.extend((0..edges.len()).map(|k| deviation(edges, k).unwrap_or(0.0)));
     for (edge, deviation) in edges.iter_mut().zip(memory.iter()) {
@@ -71,7 +69,7 @@ mod tests {
     #[test]
     fn a_straight_slanted_edge_keeps_all_its_calipers() {
         let mut edges = edges();
-        let sigma = sort_out(&mut edges, &mut Vec::new());
+        let sigma = sort_out(&mut edges, 0.3, &mut Vec::new());
         assert!(sigma < 0.1);
         assert!(edges.iter().all(Option::is_some));
     }
@@ -82,7 +80,7 @@ mod tests {
         if let Some(edge) = &mut edges[12] {
             edge.at += 4.0;
         }
-        sort_out(&mut edges, &mut Vec::new());
+        sort_out(&mut edges, 0.3, &mut Vec::new());
         assert!(edges[12].is_none());
         assert_eq!(edges.iter().flatten().count(), 29);
     }

@@ -30,15 +30,15 @@ const STRAIGHT: f64 = 3.0;
 
 const LEAST_BLUR_PX: f64 = 0.3;
 const MOST_BLUR_PX: f64 = 15.0;
-const MAX_STEPS: usize = 12;
+const MAX_STEPS: usize = 16;
+/// Shading that is usual close to an edge, as a standard deviation \[1/px\].
+const SHADING_SD: f64 = 0.02;
 
 /// Where and how an edge lies in the rows of a strip.
 pub trait Path {
-    /// Position of the edge in a row \[px\].
-    fn at(&self, v: usize) -> f32;
-    /// Level before the edge and step to the level after it in a row
-    /// \[grey levels\].
-    fn levels(&self, v: usize) -> (f32, f32);
+    /// Position of the edge in a row \[px\], level before it and step to the
+    /// level after it \[grey levels\].
+    fn expected(&self, v: usize) -> [f32; 3];
 }
 
 /// Samples that are free of anything but this edge, on either side \[px\].
@@ -50,22 +50,54 @@ pub struct Extent {
     pub after: f64,
 }
 
-/// An edge as the overlay shows it, in shares of the step that was given.
+/// A blurred step, its levels in shares of the step that was given.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shape {
-    /// How far the edge lies from the path \[px\].
+pub struct Step {
+    /// How far it lies from the path \[px\].
     pub at: f64,
-    /// Blur of the edge as the standard deviation of a Gaussian \[px\],
-    /// integration over pixels included.
+    /// Blur as the standard deviation of a Gaussian \[px\], integration over
+    /// pixels included.
     pub blur: f64,
-    /// Level before the edge.
+    /// Level before it.
     pub before: f64,
     /// Level after it.
     pub after: f64,
+}
+
+/// A first look at an edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// The step.
+    pub step: Step,
+    /// Standard deviation of its blur \[px\].
+    pub blur_sd: f64,
+    /// Change of the level before and after it \[1/px away from it\].
+    shading: [f64; 2],
+    /// Standard deviation of a pixel, in shares of the step.
+    pixel_noise: f64,
+    /// Standard deviation of a row's samples about the step, in shares of it.
+    noise: f64,
+    /// How far there is nothing but this edge.
+    room: Extent,
+}
+
+impl Look {
+    /// What the step leaves of the samples, in standard deviations of their
+    /// noise; about 1 where it is what it is taken for.
+    pub fn misfit(&self) -> f64 {
+        self.noise / self.pixel_noise
+    }
+}
+
+/// An edge as the overlay shows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shape {
+    /// The step.
+    pub step: Step,
     /// How far the surroundings are plain, and what is used of them.
     pub extent: Extent,
     /// Change of the level for each pixel away from the edge, before and after
-    /// it \[1/px\].
+    /// it, in shares of the step \[1/px\].
     pub shading: (f64, f64),
     /// Variance of the edge's position that doubt about the shading leaves
     /// \[px²\].
@@ -76,11 +108,13 @@ pub struct Shape {
 #[derive(Debug, Clone)]
 pub struct Overlay {
     rows: Vec<[f32; SPAN]>,
-    phases: Vec<usize>,
+    phases: Vec<(usize, f32)>,
     unlike: Vec<f32>,
     sorted: Vec<f32>,
     mean: [[f32; SPAN]; PHASES],
     counts: [f32; PHASES],
+    /// Mean distance of the path from the pixels' places in each phase \[px\].
+    shifts: [f32; PHASES],
 }
 
 impl Default for Overlay {
@@ -92,6 +126,7 @@ impl Default for Overlay {
             sorted: Vec::new(),
             mean: [[0.0; SPAN]; PHASES],
             counts: [0.0; PHASES],
+            shifts: [0.0; PHASES],
         }
     }
 }
@@ -102,15 +137,17 @@ impl Overlay {
     pub fn lay<T: Grey>(&mut self, strip: &Strip<'_, T>, path: &impl Path) {
         let count = strip.along.min(ROWS);
         self.rows.resize(count, [0.0; SPAN]);
-        self.phases.resize(count, 0);
+        self.phases.resize(count, (0, 0.0));
         self.unlike.resize(count, 0.0);
         let mut pixels = [T::default(); SPAN];
         for k in 0..count {
             let v = (2 * k + 1) * strip.along / (2 * count);
-            let (place, phase) = split(path.at(v), PHASES);
-            self.phases[k] = phase;
+            let [at, before, step] = path.expected(v);
+            let (place, phase) = split(at, PHASES);
+            #[expect(clippy::cast_precision_loss, reason = "a place near the gauge")]
+            let shift = at - place as f32;
+            self.phases[k] = (phase, shift);
             fetch(strip, v, place - REACH.cast_signed(), &mut pixels);
-            let (before, step) = path.levels(v);
             let (scale, shift) = (strip.scale / step, before / step);
             for (sample, pixel) in self.rows[k].iter_mut().zip(&pixels) {
                 #[expect(clippy::cast_precision_loss, reason = "16 bits fit a float")]
@@ -130,17 +167,22 @@ impl Overlay {
     fn average(&mut self, limit: f32) {
         self.mean = [[0.0; SPAN]; PHASES];
         self.counts = [0.0; PHASES];
-        for ((row, &phase), &unlike) in self.rows.iter().zip(&self.phases).zip(&self.unlike) {
+        self.shifts = [0.0; PHASES];
+        for ((row, &(phase, shift)), &unlike) in
+            self.rows.iter().zip(&self.phases).zip(&self.unlike)
+        {
             if unlike > limit {
                 continue;
             }
             self.counts[phase] += 1.0;
+            self.shifts[phase] += shift;
             for (sum, sample) in self.mean[phase].iter_mut().zip(row) {
                 *sum += sample;
             }
         }
-        for (mean, count) in self.mean.iter_mut().zip(self.counts) {
+        for ((mean, shift), count) in self.mean.iter_mut().zip(&mut self.shifts).zip(self.counts) {
             let share = 1.0 / f32::max(count, 1.0);
+            *shift *= share;
             for value in mean {
                 *value *= share;
             }
@@ -150,7 +192,8 @@ impl Overlay {
     /// How far each row lies from the mean about the edge; returns the median.
     #[inline(always)]
     fn judge(&mut self) -> f32 {
-        for ((row, &phase), unlike) in self.rows.iter().zip(&self.phases).zip(&mut self.unlike) {
+        for ((row, &(phase, _)), unlike) in self.rows.iter().zip(&self.phases).zip(&mut self.unlike)
+        {
             let mean = &self.mean[phase];
             let mut lanes = [0.0f32; 8];
             let core = REACH - CORE..REACH + CORE;
@@ -179,7 +222,7 @@ impl Overlay {
     /// Each sample's distance from the path, its value and its weight.
     fn samples(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64, f64)> {
         (0..PHASES).filter(|&phase| self.counts[phase] > 0.0).flat_map(move |phase| {
-            let shift = offset(phase, PHASES);
+            let shift = f64::from(self.shifts[phase]);
             let weight = f64::from(self.counts[phase]);
             let first = index((from + shift).ceil());
             let last = index((to + shift).floor() + 1.0);
@@ -190,33 +233,39 @@ impl Overlay {
         })
     }
 
-    /// Reads the edge's shape. `noise` is the standard deviation of a pixel
-    /// as a share of the step, `room` how far to look. `None` where no step
-    /// can be fitted.
-    pub fn shape(&self, table: &StepTable, noise: f64, room: Extent) -> Option<Shape> {
-        let (slope, steepest) = self.steepest(room)?;
-        let start = Shape {
-            at: steepest,
-            blur: (0.4 / slope).clamp(0.5, MOST_BLUR_PX),
-            before: 0.0,
-            after: 1.0,
-            extent: room,
-            shading: (0.0, 0.0),
-            variance: 0.0,
-        };
-        let room = self.up_to_neighbours(start, noise, room);
-        let mut shape = self.fit(table, Shape { extent: room, ..start }, noise)?;
-        shape.blur = (shape.blur * shape.blur - ROUNDING).max(LEAST_BLUR_PX.powi(2)).sqrt();
-        let (before, line_before) = self.plain(table, &shape, noise, -1.0, room.before);
-        let (after, line_after) = self.plain(table, &shape, noise, 1.0, room.after);
-        shape.extent = Extent { before, after };
+    /// Looks at the edge. `noise` is the standard deviation of a pixel as a
+    /// share of the step, `room` how far to look. `None` where no step can be
+    /// fitted.
+    pub fn look(&self, table: &StepTable, noise: f64, room: Extent) -> Option<Look> {
+        let (slope, at) = self.steepest(room)?;
+        let blur = (0.2 / slope).clamp(0.5, MOST_BLUR_PX);
+        let step = Step { at, blur, before: 0.0, after: 1.0 };
+        let room = self.up_to_neighbours(step, noise, room);
+        let unknown = f64::INFINITY;
+        let look =
+            Look { step, blur_sd: unknown, shading: [0.0; 2], pixel_noise: noise, noise, room };
+        self.fit(table, look, None)
+    }
+
+    /// Reads the edge's shape from a look at it and what is known of its blur:
+    /// mean and standard deviation \[px\].
+    pub fn shape(&self, table: &StepTable, look: &Look, blur: (f64, f64)) -> Option<Shape> {
+        let look = self.fit(table, *look, Some(blur))?;
+        let Look { step, noise, room, .. } = look;
+        let sharp = step.blur * step.blur - ROUNDING;
+        let step = Step { blur: sharp.max(LEAST_BLUR_PX.powi(2)).sqrt(), ..step };
+        let (before, line_before) = self.plain(table, &step, noise, -1.0, room.before);
+        let (after, line_after) = self.plain(table, &step, noise, 1.0, room.after);
         let ((slope_before, doubt_before), (slope_after, doubt_after)) =
-            (line_before.sure_slope(noise), line_after.sure_slope(noise));
-        shape.shading = (slope_before, slope_after);
+            (line_before.sure_slope(look.pixel_noise), line_after.sure_slope(look.pixel_noise));
         // A level that is off by a share moves the edge by √π blurs times it.
-        let per_level = std::f64::consts::PI * shape.blur * shape.blur;
-        shape.variance = per_level * (doubt_before + doubt_after);
-        Some(shape)
+        let per_level = std::f64::consts::PI * step.blur * step.blur;
+        Some(Shape {
+            step,
+            extent: Extent { before, after },
+            shading: (slope_before, slope_after),
+            variance: per_level * (doubt_before + doubt_after),
+        })
     }
 
     /// Steepest slope of the overlay near the path \[1/px\], and where.
@@ -248,7 +297,7 @@ impl Overlay {
 
     /// Cuts the room off half-way to a neighbouring step: where the slope has
     /// fallen off and rises again, in either direction.
-    fn up_to_neighbours(&self, start: Shape, noise: f64, room: Extent) -> Extent {
+    fn up_to_neighbours(&self, start: Step, noise: f64, room: Extent) -> Extent {
         let noise = noise / (2.0 * self.used().max(1.0)).sqrt();
         let notable = (5.0 * noise).max(0.06 / start.blur.max(1.0));
         let cut = |sign: f64, room: f64| {
@@ -270,51 +319,67 @@ impl Overlay {
     }
 
     /// Fits place, blur, levels and a little shading about the edge.
-    fn fit(&self, table: &StepTable, start: Shape, noise: f64) -> Option<Shape> {
-        let mut shape = start;
+    fn fit(&self, table: &StepTable, start: Look, known: Option<(f64, f64)>) -> Option<Look> {
+        let mut look = start;
         // Shading is held near none, because over a short way it could pass
         // for a shift of the edge.
-        let mut shading = [0.0; 2];
-        let ridge = (noise / 0.02).powi(2);
         for _ in 0..MAX_STEPS {
-            let reach = 4.5 * shape.blur + 2.0;
-            let from = (shape.at - reach.min(start.extent.before)).max(-place_limit());
-            let to = (shape.at + reach.min(start.extent.after)).min(place_limit());
-            let mut normal = Normal::<6>::default();
-            for (distance, value, weight) in self.samples(from, to) {
-                let z = (distance - shape.at) / shape.blur;
-                let (step, density) = table.at(z);
-                let height = shape.after - shape.before;
-                let depth =
-                    [shape.blur * (density - z * (1.0 - step)), shape.blur * (density + z * step)];
-                let slope = height * density / shape.blur;
-                let miss = value
-                    - shape.before * (1.0 - step)
-                    - shape.after * step
-                    - shading[0] * depth[0]
-                    - shading[1] * depth[1];
-                normal.add(
-                    [-slope, -slope * z, 1.0 - step, step, depth[0], depth[1]],
-                    miss,
-                    weight,
-                );
+            let Look { step, noise, .. } = look;
+            let (mut normal, misfit) = self.linearise(table, &look);
+            let hold = |noise: f64, sd: f64| (noise / sd).powi(2);
+            normal.hold(4, hold(start.pixel_noise, SHADING_SD), -look.shading[0]);
+            normal.hold(5, hold(start.pixel_noise, SHADING_SD), -look.shading[1]);
+            if let Some((mean, sd)) = known {
+                normal.hold(1, hold(noise, sd), mean - step.blur);
             }
-            normal.hold(4, ridge, -shading[0]);
-            normal.hold(5, ridge, -shading[1]);
-            let step = normal.solve()?;
-            shape.at += step[0].clamp(-shape.blur, shape.blur);
-            shape.blur = (shape.blur + step[1].clamp(-0.5 * shape.blur, 0.5 * shape.blur))
-                .clamp(LEAST_BLUR_PX, MOST_BLUR_PX);
-            shape.before += step[2];
-            shape.after += step[3];
-            shading[0] += step[4];
-            shading[1] += step[5];
-            if step[0].abs() < 2e-3 && step[1].abs() < 2e-3 * shape.blur {
+            let inverse = normal.inverse()?;
+            let moved = inverse * normal.vector;
+            // What the model leaves is noise, if not of the pixels.
+            look.noise = start.pixel_noise.max(misfit.sqrt());
+            look.blur_sd = look.noise * inverse[(1, 1)].max(0.0).sqrt();
+            look.step = Step {
+                at: step.at + moved[0].clamp(-step.blur, step.blur),
+                blur: (step.blur + moved[1].clamp(-0.5 * step.blur, 0.5 * step.blur))
+                    .clamp(LEAST_BLUR_PX, MOST_BLUR_PX),
+                before: step.before + moved[2],
+                after: step.after + moved[3],
+            };
+            look.shading[0] += moved[4];
+            look.shading[1] += moved[5];
+            if moved[0].abs() < 2e-3 && moved[1].abs() < 2e-3 * step.blur {
                 break;
             }
         }
-        let inside = shape.at > -start.extent.before && shape.at < start.extent.after;
-        (inside && shape.after - shape.before > 0.1).then_some(shape)
+        let inside = look.step.at > -look.room.before && look.step.at < look.room.after;
+        (inside && look.step.after - look.step.before > 0.1).then_some(look)
+    }
+
+    /// Normal equations about a step, and the mean square of what it leaves,
+    /// for a sample of weight 1.
+    fn linearise(&self, table: &StepTable, look: &Look) -> (Normal<6>, f64) {
+        let Look { step: edge, room, shading, .. } = *look;
+        let reach = 4.5 * edge.blur + 2.0;
+        let from = (edge.at - reach.min(room.before)).max(-place_limit());
+        let to = (edge.at + reach.min(room.after)).min(place_limit());
+        let height = edge.after - edge.before;
+        let mut normal = Normal::<6>::default();
+        let (mut square, mut n) = (0.0, -6.0);
+        for (distance, value, weight) in self.samples(from, to) {
+            let z = (distance - edge.at) / edge.blur;
+            let (step, density) = table.at(z);
+            let depth = [density - z * (1.0 - step), density + z * step].map(|d| d * edge.blur);
+            let slope = height * density / edge.blur;
+            let miss = value
+                - edge.before * (1.0 - step)
+                - edge.after * step
+                - shading[0] * depth[0]
+                - shading[1] * depth[1];
+            square += weight * miss * miss;
+            n += 1.0;
+            let row = [-slope, -slope * z, 1.0 - step, step, depth[0], depth[1]];
+            normal.add(row, miss, weight);
+        }
+        (normal, square / f64::max(n, 1.0))
     }
 
     /// How far from the edge a side is plain, that is a straight line within
@@ -322,7 +387,7 @@ impl Overlay {
     fn plain(
         &self,
         table: &StepTable,
-        shape: &Shape,
+        shape: &Step,
         noise: f64,
         sign: f64,
         room: f64,
@@ -445,8 +510,8 @@ impl<const N: usize> Normal<N> {
         for i in 0..N {
             let weighted = weight * row[i];
             self.vector[i] += weighted * miss;
-            for j in 0..=i {
-                self.matrix[(i, j)] += weighted * row[j];
+            for (j, other) in row.iter().take(i + 1).enumerate() {
+                self.matrix[(i, j)] += weighted * other;
             }
         }
     }
@@ -456,7 +521,7 @@ impl<const N: usize> Normal<N> {
         self.vector[which] += weight * miss;
     }
 
-    fn solve(&mut self) -> Option<nalgebra::SVector<f64, N>>
+    fn inverse(&mut self) -> Option<nalgebra::SMatrix<f64, N, N>>
     where
         nalgebra::Const<N>: nalgebra::DimMin<nalgebra::Const<N>>,
     {
@@ -465,7 +530,7 @@ impl<const N: usize> Normal<N> {
             self.matrix[(k, k)] += 1e-12;
         }
         self.matrix.fill_upper_triangle_with_lower_triangle();
-        Some(self.matrix.cholesky()?.solve(&self.vector))
+        Some(self.matrix.cholesky()?.inverse())
     }
 }
 

@@ -36,7 +36,7 @@ pub struct Pair {
 pub fn find(
     lefts: &Contours,
     rights: &Contours,
-    search: &Search,
+    search: Search,
     memory: &mut Vec<f32>,
 ) -> Option<Pair> {
     let mut best: Option<Pair> = None;
@@ -129,7 +129,7 @@ mod tests {
         (up, down)
     }
 
-    fn width(bars: &(Contours, Contours), search: &Search) -> Option<f32> {
+    fn width(bars: &(Contours, Contours), search: Search) -> Option<f32> {
         let mut memory = Vec::new();
         let pair = find(&bars.0, &bars.1, search, &mut memory)?;
         distance(&bars.0.all()[pair.left], &bars.1.all()[pair.right], &mut memory)
@@ -139,20 +139,20 @@ mod tests {
 
     #[test]
     fn the_gap_between_two_beads_is_not_bridged() {
-        let found = width(&bars(&[(50, 75, 80), (85, 110, 80)]), &WIDE).unwrap();
+        let found = width(&bars(&[(50, 75, 80), (85, 110, 80)]), WIDE).unwrap();
         assert!((found - 25.0).abs() < 0.5);
     }
 
     #[test]
     fn a_fainter_bead_beside_it_is_not_the_bead() {
         let bars = bars(&[(40, 70, 50), (90, 130, 80)]);
-        assert!((width(&bars, &WIDE).unwrap() - 40.0).abs() < 0.5);
+        assert!((width(&bars, WIDE).unwrap() - 40.0).abs() < 0.5);
     }
 
     #[test]
     fn a_width_out_of_range_is_no_pair() {
         let bars = bars(&[(60, 100, 80)]);
-        assert!((width(&bars, &WIDE).unwrap() - 40.0).abs() < 0.5);
-        assert_eq!(width(&bars, &Search { width_px: (50.0, 90.0) }), None);
+        assert!((width(&bars, WIDE).unwrap() - 40.0).abs() < 0.5);
+        assert_eq!(width(&bars, Search { width_px: (50.0, 90.0) }), None);
     }
 }

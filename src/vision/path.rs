@@ -2,7 +2,7 @@
 //! can be held against.
 
 use super::overlay::Path;
-use super::pool::Bands;
+use super::pool::{Bands, middle};
 
 /// Bands on either side that a smoothed value is taken from.
 const NEIGHBOURS: usize = 3;
@@ -117,65 +117,86 @@ pub fn smooth(values: &[f32], out: &mut Vec<f32>) {
     }
 }
 
-/// What is expected of an edge in every row.
+/// What is expected of an edge along the gauge: place, level before it and
+/// step, on lines between the middles of the bands.
 #[derive(Debug, Clone, Default)]
-pub struct Rows {
-    /// Place, level before and step of each row.
+pub struct Course {
+    middles: Vec<f32>,
     values: Vec<[f32; 3]>,
 }
 
-impl Rows {
-    /// Draws lines between the middles of the bands and on beyond the first
-    /// and the last.
+impl Course {
+    /// Draws the lines between the bands.
     pub fn draw(&mut self, bands: &Bands, at: &[f32], before: &[f32], step: &[f32]) {
+        self.middles.clear();
+        self.middles.extend((0..bands.count()).map(|band| narrow(bands.middle(band))));
         self.values.clear();
-        let of = |band: usize| [at[band], before[band], step[band]];
-        let count = bands.count();
-        if count == 1 {
-            self.values.resize(bands.rows(0).1, of(0));
-            return;
-        }
-        for band in 0..count - 1 {
-            let (middle, next) = (narrow(bands.middle(band)), narrow(bands.middle(band + 1)));
-            let first = if band == 0 { 0 } else { self.values.len() };
-            let last = if band + 2 == count { bands.rows(count - 1).1 } else { ceil(next) };
-            let (here, there) = (of(band), of(band + 1));
-            let per_row = 1.0 / (next - middle);
-            let slope = [
-                (there[0] - here[0]) * per_row,
-                (there[1] - here[1]) * per_row,
-                (there[2] - here[2]) * per_row,
-            ];
-            for v in first..last {
-                #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-                let away = v as f32 - middle;
-                // Levels are not carried on beyond the last that was seen.
-                let within = away.clamp(0.0, next - middle);
-                self.values.push([
-                    here[0] + away * slope[0],
-                    here[1] + within * slope[1],
-                    here[2] + within * slope[2],
-                ]);
-            }
+        self.values.extend((0..at.len()).map(|band| [at[band], before[band], step[band]]));
+    }
+
+    /// Moves all of it aside and takes other levels: those before and after
+    /// the edge as shares of the step.
+    pub fn adopt(&mut self, aside: f32, (before, after): (f32, f32)) {
+        for [at, level, step] in &mut self.values {
+            *at += aside;
+            *level += before * *step;
+            *step *= after - before;
         }
     }
 
-    /// Place, level before and step of a row.
+    /// Draws the line anew through better places; levels stay. `memory` is
+    /// scratch.
+    pub fn redraw(&mut self, lines: &[(usize, usize)], at: &[f32], memory: &mut Vec<[f32; 3]>) {
+        memory.clear();
+        memory.extend(lines.iter().zip(at).map(|(&line, &at)| {
+            let [_, before, step] = self.at(narrow(middle(line)));
+            [at, before, step]
+        }));
+        std::mem::swap(&mut self.values, memory);
+        self.middles.clear();
+        self.middles.extend(lines.iter().map(|&line| narrow(middle(line))));
+    }
+
+    /// Place, level before and step at a row, or between two. Beyond the first
+    /// and the last band the edge runs on, but levels do not change.
     #[inline(always)]
-    pub fn of(&self, v: usize) -> [f32; 3] {
-        self.values[v]
+    pub fn at(&self, v: f32) -> [f32; 3] {
+        let last = self.middles.len() - 1;
+        if last == 0 {
+            return self.values[0];
+        }
+        let pitch = (self.middles[last] - self.middles[0]) / float(last);
+        let mut band = floor((v - self.middles[0]) / pitch).min(last - 1);
+        // Bands differ by a row in height.
+        if v < self.middles[band] && band > 0 {
+            band -= 1;
+        } else if v >= self.middles[band + 1] && band + 1 < last {
+            band += 1;
+        }
+        let (middle, next) = (self.middles[band], self.middles[band + 1]);
+        let (here, there) = (&self.values[band], &self.values[band + 1]);
+        let share = (v - middle) / (next - middle);
+        let within = share.clamp(0.0, 1.0);
+        [
+            here[0] + share * (there[0] - here[0]),
+            here[1] + within * (there[1] - here[1]),
+            here[2] + within * (there[2] - here[2]),
+        ]
+    }
+
+    /// Steepest slope of the edge between two bands.
+    pub fn steepest(&self) -> f32 {
+        let slopes = self.values.windows(2).zip(self.middles.windows(2));
+        slopes
+            .map(|(at, middle)| ((at[1][0] - at[0][0]) / (middle[1] - middle[0])).abs())
+            .fold(0.0, f32::max)
     }
 }
 
-impl Path for Rows {
+impl Path for Course {
     #[inline(always)]
-    fn at(&self, v: usize) -> f32 {
-        self.values[v][0]
-    }
-
-    #[inline(always)]
-    fn levels(&self, v: usize) -> (f32, f32) {
-        (self.values[v][1], self.values[v][2])
+    fn expected(&self, v: usize) -> [f32; 3] {
+        self.at(float(v))
     }
 }
 
@@ -184,13 +205,18 @@ fn narrow(value: f64) -> f32 {
     value as f32
 }
 
+#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+fn float(number: usize) -> f32 {
+    number as f32
+}
+
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "pixel coordinates are small and positive"
+    reason = "saturates at 0; pixel coordinates are small"
 )]
-fn ceil(value: f32) -> usize {
-    value.ceil() as usize
+fn floor(value: f32) -> usize {
+    value as usize
 }
 
 #[cfg(test)]
@@ -204,6 +230,34 @@ mod tests {
         assert!(fill(rough.into_iter(), &mut out));
         assert_eq!(out, [2.0, 2.0, 3.0, 4.0, 5.0, 5.0]);
         assert!(!fill([None, None].into_iter(), &mut out));
+    }
+
+    #[test]
+    fn the_course_runs_straight_between_bands_and_on_beyond_them() {
+        let frame = crate::frame::Frame::new(
+            0,
+            crate::time::Stamp::START,
+            (20, 43),
+            crate::frame::Pixels::Grey8(vec![0; 860]),
+        );
+        let frame = frame.unwrap();
+        let roi = crate::geometry::Roi { x: 0, y: 0, width: 20, height: 43 };
+        let view = crate::vision::strip::View::new(roi, crate::vision::gauge::Axis::Vertical);
+        let mut turner = crate::vision::strip::Turner::default();
+        let crate::vision::strip::Strips::Bytes(strip) = turner.strips(&frame, &view, None) else {
+            unreachable!()
+        };
+        let mut bands = Bands::default();
+        bands.pool(&strip, 8);
+        let at: Vec<f32> = (0..8).map(|band| 3.0 + 0.5 * narrow(bands.middle(band))).collect();
+        let mut course = Course::default();
+        course.draw(&bands, &at, &[40.0; 8], &[80.0; 8]);
+        for v in 0..43u8 {
+            let [place, before, step] = course.at(f32::from(v));
+            assert!((place - 3.0 - 0.5 * f32::from(v)).abs() < 1e-4);
+            assert_eq!((before, step), (40.0, 80.0));
+        }
+        assert!((course.steepest() - 0.5).abs() < 1e-5);
     }
 
     #[test]

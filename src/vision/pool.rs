@@ -1,6 +1,7 @@
 //! Pooling of rows: the gauge is cut into bands along the bead, and a few rows
 //! of each are averaged into one profile across it, for the first pick. The
-//! sub-pixel position comes from all rows later.
+//! sub-pixel position comes from all rows later, which are cut into caliper
+//! lines likewise.
 
 use super::strip::{Grey, Strip};
 
@@ -8,6 +9,10 @@ use super::strip::{Grey, Strip};
 /// from its surroundings when the contrast is low, more would smear slanted
 /// edges.
 const ROWS: usize = 4;
+
+/// Profiles at most: the pick needs no more, and reading whole rows is what
+/// takes its time.
+const MOST: usize = 32;
 
 /// Bits that a profile's sums are cut to, so that four of them fit 15.
 const BITS: u32 = 12;
@@ -48,10 +53,8 @@ impl Bands {
     }
 
     /// Middle of a band along the bead \[px\].
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     pub fn middle(&self, band: usize) -> f64 {
-        let (from, to) = self.bounds[band];
-        (from + to - 1) as f64 / 2.0
+        middle(self.bounds[band])
     }
 
     /// Share of the pooled pixels at the upper end of the scale.
@@ -60,14 +63,13 @@ impl Bands {
         self.full as f64 / self.pixels.max(1) as f64
     }
 
-    /// Cuts the strip into at most `calipers` bands and pools each.
+    /// Cuts the strip into bands, of which there are at most as many as caliper
+    /// lines, and pools each.
     #[inline(always)]
     pub fn pool<T: Grey>(&mut self, strip: &Strip<'_, T>, calipers: usize) {
         self.across = strip.across;
-        let count = calipers.min(strip.along / ROWS).max(1);
-        self.bounds.clear();
-        self.bounds
-            .extend((0..count).map(|k| (k * strip.along / count, (k + 1) * strip.along / count)));
+        cut(strip.along, calipers.min(MOST), &mut self.bounds);
+        let count = self.bounds.len();
         self.profiles.resize(count * strip.across, 0);
         let most = 4 * strip.white.level().max(1);
         self.shift = (most.ilog2() + 1).saturating_sub(BITS);
@@ -88,6 +90,20 @@ impl Bands {
             }
         }
     }
+}
+
+/// Cuts rows into as many pieces as asked for, but none of fewer than a band
+/// needs: first row and the row after the last of each.
+pub fn cut(along: usize, pieces: usize, bounds: &mut Vec<(usize, usize)>) {
+    let count = pieces.min(along / ROWS).max(1);
+    bounds.clear();
+    bounds.extend((0..count).map(|k| (k * along / count, (k + 1) * along / count)));
+}
+
+/// Middle of a piece \[px\].
+#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+pub fn middle((from, to): (usize, usize)) -> f64 {
+    (from + to - 1) as f64 / 2.0
 }
 
 /// The `k`-th of the rows that stand for a band, evenly spread and symmetric

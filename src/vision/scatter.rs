@@ -34,9 +34,10 @@ pub fn inflation(places: &[Option<f64>], variance: f64, memory: &mut Vec<f64>) -
     }
     // Covariance of a place with itself and with the next, before the
     // parabola was taken off: same = p₀c₀ + 2p₁c₁, next = p₁c₀ + (p₀ + p₂)c₁.
-    let (a, b, c, d) = (passed[0], 2.0 * passed[1], passed[1], passed[0] + passed[2]);
-    let under = a * d - b * c;
-    let (itself, with_next) = ((d * same - b * next) / under, (a * next - c * same) / under);
+    let both = passed[0] + passed[2];
+    let under = passed[0] * both - 2.0 * passed[1] * passed[1];
+    let itself = (both * same - 2.0 * passed[1] * next) / under;
+    let with_next = (passed[0] * next - passed[1] * same) / under;
     ((itself + 2.0 * with_next.max(0.0)) / variance).max(ratio)
 }
 

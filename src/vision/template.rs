@@ -131,7 +131,7 @@ impl Default for Template {
 impl Template {
     /// Tabulates an edge.
     pub fn tabulate(&mut self, table: &StepTable, shape: &Shape) {
-        let half = CORE_BLURS * shape.blur + CORE_BESIDE_PX;
+        let half = CORE_BLURS * shape.step.blur + CORE_BESIDE_PX;
         let core = chunks(2.0 * half).clamp(1, MAX_CORE);
         // A step that goes on beyond the core leaves nothing plain.
         let plain = if 2.0 * half > float(MAX_CORE * LANES) { 0 } else { MAX_PLAIN };
@@ -155,6 +155,16 @@ impl Template {
         self.products = products.mean();
     }
 
+    /// Plain pixels of a row before the edge and after it; half a one where
+    /// there are none.
+    pub fn plain_pixels(&self) -> [f64; 2] {
+        let parts = &self.parts[..self.chunks];
+        let count = |parts: &[Part]| -> f64 {
+            parts.iter().flat_map(|part| part.mask).map(f64::from).sum::<f64>().max(0.5)
+        };
+        [count(&parts[..self.core.start]), count(&parts[self.core.end..])]
+    }
+
     /// The place at which a row is sampled, which lies within a sixteenth of a
     /// pixel of the one that was asked for \[px\].
     #[inline(always)]
@@ -167,12 +177,13 @@ impl Template {
         place + phase / phases
     }
 
-    /// Holds a row against the edge.
+    /// Holds the mean of a few neighbouring rows, from `v` on, against the
+    /// edge.
     #[inline(always)]
     pub fn hold<T: Grey>(
         &self,
         strip: &Strip<'_, T>,
-        v: usize,
+        (v, count): (usize, usize),
         expected: &Expected,
         plain: &mut PlainSums,
     ) -> RowSums {
@@ -181,22 +192,20 @@ impl Template {
         let start = place - reach;
         let length = self.chunks * LANES;
         let parts = &self.parts[phase * MAX_CHUNKS..][..self.chunks];
-        let row = strip.row(v);
-        match usize::try_from(start).ok().and_then(|from| row.get(from..from + length)) {
-            Some(pixels) => self.sum(parts, pixels, strip.scale, expected, plain),
-            None => {
-                let mut pixels = [T::default(); MAX_CHUNKS * LANES];
-                strip.fetch(v, start, &mut pixels[..length]);
-                self.sum(parts, &pixels[..length], strip.scale, expected, plain)
-            }
+        let mut sums = [0u32; MAX_CHUNKS * LANES];
+        for row in v..v + count {
+            add_row(strip, row, start, &mut sums[..length]);
         }
+        #[expect(clippy::cast_precision_loss, reason = "a few rows")]
+        let scale = strip.scale / count as f32;
+        self.sum(parts, &sums[..length], scale, expected, plain)
     }
 
     #[inline(always)]
-    fn sum<T: Grey>(
+    fn sum(
         &self,
         parts: &[Part],
-        pixels: &[T],
+        pixels: &[u32],
         scale: f32,
         expected: &Expected,
         plain: &mut PlainSums,
@@ -231,9 +240,26 @@ impl Template {
 }
 
 #[inline(always)]
-fn add_plain<T: Grey>(
+fn add_row<T: Grey>(strip: &Strip<'_, T>, v: usize, start: isize, sums: &mut [u32]) {
+    let row = strip.row(v);
+    let within = usize::try_from(start).ok().and_then(|from| row.get(from..from + sums.len()));
+    if let Some(pixels) = within {
+        for (sum, pixel) in sums.iter_mut().zip(pixels) {
+            *sum += pixel.level();
+        }
+    } else {
+        let mut pixels = [T::default(); MAX_CHUNKS * LANES];
+        strip.fetch(v, start, &mut pixels[..sums.len()]);
+        for (sum, pixel) in sums.iter_mut().zip(&pixels) {
+            *sum += pixel.level();
+        }
+    }
+}
+
+#[inline(always)]
+fn add_plain(
     parts: &[Part],
-    pixels: &[T],
+    pixels: &[u32],
     scale: f32,
     expected: &Expected,
     [count, sum]: &mut [Chunk; 2],
@@ -249,9 +275,9 @@ fn add_plain<T: Grey>(
 }
 
 #[inline(always)]
-fn residual<T: Grey>(part: &Part, k: usize, pixel: T, scale: f32, expected: &Expected) -> f32 {
-    #[expect(clippy::cast_precision_loss, reason = "16 bits fit a float")]
-    let level = pixel.level() as f32;
+fn residual(part: &Part, k: usize, pixel: u32, scale: f32, expected: &Expected) -> f32 {
+    #[expect(clippy::cast_precision_loss, reason = "a few 16-bit values fit a float")]
+    let level = pixel as f32;
     level * scale - expected.before - expected.step * part.step[k]
 }
 
@@ -273,17 +299,17 @@ fn total(lanes: &Chunk) -> f32 {
 fn fill(part: &mut Part, table: &StepTable, shape: &Shape, first: f64, plain: bool) {
     for k in 0..LANES {
         let distance = first + float(k);
-        let z = distance / shape.blur;
+        let z = distance / shape.step.blur;
         let (step, density) = if plain { (f64::from(distance > 0.0), 0.0) } else { table.at(z) };
-        let depth_before = shape.blur * (density - z * (1.0 - step));
-        let depth_after = shape.blur * (density + z * step);
+        let depth_before = shape.step.blur * (density - z * (1.0 - step));
+        let depth_after = shape.step.blur * (density + z * step);
         let shading = shape.shading.0 * depth_before + shape.shading.1 * depth_after;
         let counts = distance >= -shape.extent.before && distance <= shape.extent.after;
         let mask = f64::from(counts);
         part.step[k] = (step + shading) as f32;
         part.mask[k] = mask as f32;
         part.after[k] = (mask * step) as f32;
-        part.slope[k] = (mask * density / shape.blur) as f32;
+        part.slope[k] = (mask * density / shape.step.blur) as f32;
     }
 }
 

@@ -5,9 +5,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::overlay::{Extent, Overlay, REACH, Shape};
-use super::path::{self, Rows};
-use super::pool::Bands;
+use super::overlay::{Extent, Look, Overlay, REACH, Shape, Step};
+use super::path::{self, Course};
+use super::pool::{self, Bands};
+use super::refine::{Refiner, Task};
 use super::step::StepTable;
 use super::strip::{Grey, Strip};
 use super::template::{Expected, PlainSums, RowSums, Template};
@@ -23,8 +24,16 @@ const MANY_SIGMA: f32 = 4.5;
 const UNLIKE: f32 = 2.5;
 /// Rows of a band may differ by this much beside their noise \[px\].
 const WAVY_PX: f32 = 0.5;
+/// Rows from which on some are taken together, as many at most, and how far an
+/// edge may run aside within them \[px\].
+const PLENTY: usize = 120;
+const MOST_TOGETHER: usize = 4;
+const STRAIGHT_PX: f32 = 0.6;
 /// Wild pixels that a row may have; more are a grain.
 const FEW_WILD: f32 = 2.0;
+/// Share of the plain pixels that must be as they are expected for their level
+/// to be believed.
+const LEAST_PLAIN: f64 = 0.6;
 /// Share of its rows that a band must have left to count.
 const LEAST_SHARE: f64 = 0.5;
 /// Where levels are picked first: distance from the edge, and apart \[px\].
@@ -53,6 +62,8 @@ pub struct Scene<'a, T> {
     pub strip: &'a Strip<'a, T>,
     /// Its bands.
     pub bands: &'a Bands,
+    /// Its caliper lines: first row and the row after the last of each.
+    pub lines: &'a [(usize, usize)],
     /// Noise of a pixel \[grey levels\].
     pub noise: f32,
     /// Room between the two edges of the bead \[px\], at its narrowest.
@@ -68,21 +79,36 @@ pub struct Tracer {
     path: Vec<f32>,
     before: Vec<f32>,
     step: Vec<f32>,
-    rows: Rows,
+    course: Course,
+    groups: Vec<Group>,
     overlay: Overlay,
+    seen: Option<Look>,
     template: Template,
-    sums: Vec<(f32, RowSums)>,
     plain: Vec<PlainSums>,
-    misfits: Vec<f32>,
     sorted: Vec<f32>,
     solved: Vec<BandSums>,
+    memory: Vec<[f32; 3]>,
     scatter: Vec<f64>,
     edges: Vec<Option<Located>>,
+    refiner: Refiner,
     /// Blur of the edge \[px\].
     pub blur_px: f64,
     /// Variance of the whole edge's position that all places share, from
     /// shading that is not known better \[px²\].
     pub common_variance: f64,
+}
+
+/// A few rows that are held against the edge together.
+#[derive(Debug, Clone, Copy)]
+struct Group {
+    band: usize,
+    /// Number of rows.
+    weight: f32,
+    /// How far the rows were sampled beyond the path \[px\].
+    ahead: f32,
+    sums: RowSums,
+    /// Sum of the squares of what does not fit \[grey levels²\].
+    misfit: f32,
 }
 
 /// Sums over the rows of a band that count.
@@ -113,47 +139,85 @@ impl Tracer {
         &mut self.edges
     }
 
-    /// Locates the edge from rough places, one a band. Returns whether there
-    /// is an edge at all.
+    /// Looks at the edge along rough places, one a band: its blur and how sure
+    /// that is \[px\]. `None` where there is no edge.
+    #[inline(always)]
+    pub fn look<T: Grey>(
+        &mut self,
+        table: &StepTable,
+        scene: &Scene<'_, T>,
+        rough: impl Iterator<Item = Option<f32>>,
+    ) -> Option<(f64, f64)> {
+        self.edges.clear();
+        self.seen = None;
+        self.path.clear();
+        if !path::fill(rough, &mut self.rough) {
+            return None;
+        }
+        path::take_out_wild(&mut self.rough, &mut self.sorted);
+        let rest = self.rough.iter().map(|at| at.is_finite().then_some(*at));
+        if !path::fill(rest, &mut self.path) {
+            return None;
+        }
+        path::median_of_three(&mut self.path);
+        path::smooth(&self.path, &mut self.rough);
+        std::mem::swap(&mut self.rough, &mut self.path);
+        self.pick_levels(scene);
+        self.course.draw(scene.bands, &self.path, &self.before, &self.step);
+        self.overlay.lay(scene.strip, &self.course);
+        let noise = f64::from(scene.noise) / f64::from(typical(&self.step).abs());
+        self.seen = self.overlay.look(table, noise, self.room(scene));
+        self.seen.map(|seen| (seen.step.blur, seen.blur_sd))
+    }
+
+    /// Locates the edge that was looked at, with what is known of its blur:
+    /// mean and standard deviation \[px\]. Returns whether there is one.
     #[inline(always)]
     pub fn trace<T: Grey>(
         &mut self,
         table: &StepTable,
         scene: &Scene<'_, T>,
-        rough: impl Iterator<Item = Option<f32>>,
+        blur: (f64, f64),
     ) -> bool {
-        self.edges.clear();
-        if !path::fill(rough, &mut self.rough) {
-            return false;
-        }
-        path::take_out_wild(&mut self.rough, &mut self.sorted);
-        let rest = self.rough.iter().map(|at| at.is_finite().then_some(*at));
-        if !path::fill(rest, &mut self.path) {
-            return false;
-        }
-        std::mem::swap(&mut self.rough, &mut self.path);
-        path::median_of_three(&mut self.rough);
-        path::smooth(&self.rough, &mut self.path);
-        self.pick_levels(scene);
-        self.rows.draw(scene.bands, &self.path, &self.before, &self.step);
-        self.overlay.lay(scene.strip, &self.rows);
-        let noise = f64::from(scene.noise) / f64::from(typical(&self.step).abs());
-        let Some(shape) = self.overlay.shape(table, noise, self.room(scene)) else {
-            return false;
-        };
+        let Some(seen) = &self.seen else { return false };
+        let Some(shape) = self.overlay.shape(table, seen, blur) else { return false };
         let shape = self.adopt(shape);
-        self.blur_px = shape.blur;
+        self.blur_px = shape.step.blur;
         self.common_variance = shape.variance;
         self.template.tabulate(table, &shape);
         for _ in 0..MAX_PASSES {
-            self.rows.draw(scene.bands, &self.path, &self.before, &self.step);
             self.hold(scene);
             self.gather(scene);
-            if self.locate(scene, shape.blur) {
+            if self.locate(scene, shape.step.blur) {
                 break;
             }
         }
         true
+    }
+
+    /// How much worse than noise explains a blurred step fits the edge that was
+    /// looked at; about 1 where it is one.
+    pub fn misfit(&self) -> f64 {
+        self.seen.as_ref().map_or(1.0, Look::misfit)
+    }
+
+    /// Locates the edge anew, line by line, where it is not a blurred step.
+    /// Returns whether there is one.
+    pub fn refine<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
+        let width_px = f64::from(scene.width_px);
+        let task = Task { strip: scene.strip, lines: scene.lines, width_px };
+        if self.path.is_empty() {
+            return false;
+        }
+        self.edges.clear();
+        self.edges.resize(scene.lines.len(), None);
+        let course = &self.course;
+        let rough =
+            scene.lines.iter().map(|&line| f64::from(course.at(narrow(pool::middle(line)))[0]));
+        let found = self.refiner.refine(table, &task, scene.bead_after, &mut self.edges, rough);
+        self.blur_px = self.refiner.blur_px;
+        self.common_variance = 0.0;
+        found
     }
 
     /// Levels on either side of the edge in every band, as the median of a few
@@ -217,37 +281,56 @@ impl Tracer {
     /// Takes over what the overlay shows: the path is moved, and levels and
     /// shading are those at the edge.
     fn adopt(&mut self, shape: Shape) -> Shape {
-        let height = shape.after - shape.before;
-        for ((at, before), step) in self.path.iter_mut().zip(&mut self.before).zip(&mut self.step) {
-            *at += narrow(shape.at);
-            *before += narrow(shape.before) * *step;
-            *step *= narrow(height);
-        }
+        let Step { at, before, after, .. } = shape.step;
+        let height = after - before;
+        self.course.adopt(narrow(at), (narrow(before), narrow(after)));
         Shape {
-            at: 0.0,
-            before: 0.0,
-            after: 1.0,
+            step: Step { at: 0.0, before: 0.0, after: 1.0, ..shape.step },
             shading: (shape.shading.0 / height, shape.shading.1 / height),
             variance: shape.variance / (height * height),
             ..shape
         }
     }
 
+    /// Rows that are taken together: one where there are few, more where a
+    /// tall gauge has plenty, as long as the edge runs straight through them.
+    fn rows_together<T: Grey>(&self, scene: &Scene<'_, T>) -> usize {
+        let plenty = (scene.strip.along / PLENTY).clamp(1, MOST_TOGETHER);
+        let straight = STRAIGHT_PX / self.course.steepest().max(1e-3);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "positive; what is large is cut to a few"
+        )]
+        let straight = straight as usize;
+        plenty.min(straight.max(1))
+    }
+
     /// Holds every row against the edge.
     #[inline(always)]
     fn hold<T: Grey>(&mut self, scene: &Scene<'_, T>) {
-        self.sums.clear();
+        let together = self.rows_together(scene);
+        self.groups.clear();
         self.plain.clear();
-        for band in 0..scene.bands.count() {
-            let (from, to) = scene.bands.rows(band);
+        for (band, &(from, to)) in scene.lines.iter().enumerate() {
+            let mut v = from;
             let mut plain = PlainSums::default();
-            for v in from..to {
-                let [at, before, step] = self.rows.of(v);
-                let at = Template::sampled(at);
-                let tolerance = MANY_SIGMA * scene.noise + 0.05 * step.abs();
-                let tolerance_at_step = MANY_SIGMA * scene.noise + 0.15 * step.abs();
-                let expected = Expected { at, before, step, tolerance, tolerance_at_step };
-                self.sums.push((at, self.template.hold(scene.strip, v, &expected, &mut plain)));
+            while v < to {
+                let rows = together.min(to - v);
+                let weight = count_of(rows);
+                let [path, before, step] = self.course.at(count_of(2 * v + rows - 1) / 2.0);
+                let at = Template::sampled(path);
+                let noise = MANY_SIGMA * scene.noise / weight.sqrt();
+                let expected = Expected {
+                    at,
+                    before,
+                    step,
+                    tolerance: noise + 0.05 * step.abs(),
+                    tolerance_at_step: noise + 0.15 * step.abs(),
+                };
+                let sums = self.template.hold(scene.strip, (v, rows), &expected, &mut plain);
+                self.groups.push(Group { band, weight, ahead: at - path, sums, misfit: 0.0 });
+                v += rows;
             }
             self.plain.push(plain);
         }
@@ -258,16 +341,17 @@ impl Tracer {
     fn gather<T: Grey>(&mut self, scene: &Scene<'_, T>) {
         let products = self.template.products;
         let stiffness = narrow(products.slope_slope);
-        self.misfits.clear();
-        self.misfits.extend(self.sums.iter().map(|(_, sums)| {
-            if sums.wild > FEW_WILD {
+        self.sorted.clear();
+        for group in &mut self.groups {
+            let sums = &group.sums;
+            // As if of a single row, so that groups of all sizes compare.
+            group.misfit = if sums.wild > FEW_WILD {
                 f32::INFINITY
             } else {
-                sums.squares - sums.slope * sums.slope / stiffness
-            }
-        }));
-        self.sorted.clear();
-        self.sorted.extend(self.misfits.iter().step_by(self.misfits.len().div_ceil(128)));
+                group.weight * (sums.squares - sums.slope * sums.slope / stiffness)
+            };
+            self.sorted.push(group.misfit);
+        }
         let middle = self.sorted.len() / 2;
         let median = *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
         let pixels = narrow(products.pixels);
@@ -275,62 +359,67 @@ impl Tracer {
         let limit = noise.max(UNLIKE * median);
         self.spread_misfits(limit);
         self.solved.clear();
-        for band in 0..scene.bands.count() {
-            let sums = self.gather_band(scene, band, limit, &products.matrix());
+        let mut first = 0;
+        for band in 0..scene.lines.len() {
+            let mut end = first;
+            while end < self.groups.len() && self.groups[end].band == band {
+                end += 1;
+            }
+            let sums = self.gather_band(scene, (band, first..end), limit, &products.matrix());
             self.solved.push(sums);
+            first = end;
         }
     }
 
     /// Rows next to one that fits badly share its grain or spark.
     fn spread_misfits(&mut self, limit: f32) {
-        self.sorted.clear();
-        self.sorted.extend_from_slice(&self.misfits);
-        let rows = self.misfits.len();
-        for (v, _) in self.sorted.iter().enumerate().filter(|(_, misfit)| **misfit > limit) {
-            for beside in v.saturating_sub(1)..(v + 2).min(rows) {
-                self.misfits[beside] = self.misfits[beside].max(self.sorted[v]);
+        let mut before = 0.0;
+        for k in 0..self.groups.len() {
+            let here = self.groups[k].misfit;
+            let after = self.groups.get(k + 1).map_or(0.0, |group| group.misfit);
+            let beside = f32::max(before, after);
+            if beside > limit {
+                self.groups[k].misfit = here.max(beside);
             }
+            before = here;
         }
     }
 
     fn gather_band<T: Grey>(
         &mut self,
         scene: &Scene<'_, T>,
-        band: usize,
+        (band, groups): (usize, std::ops::Range<usize>),
         limit: f32,
         core: &Matrix3<f64>,
     ) -> BandSums {
         let stiffness = narrow(core[(0, 0)]);
-        let (from, to) = scene.bands.rows(band);
-        let step = self.step[band];
-        let moved = |v: usize| -> f32 {
-            let (at, sums) = &self.sums[v];
-            at - self.rows.of(v)[0] - sums.slope / (step * stiffness)
-        };
+        let [_, _, step] = self.course.at(narrow(pool::middle(scene.lines[band])));
+        let groups = &self.groups[groups];
+        let moved = |group: &Group| group.ahead - group.sums.slope / (step * stiffness);
         self.sorted.clear();
-        self.sorted.extend((from..to).filter(|&v| self.misfits[v] <= limit).map(moved));
-        let middle = self.sorted.len() / 2;
-        let typical = if self.sorted.is_empty() {
-            0.0
-        } else {
-            *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1
-        };
-        let far = MANY_SIGMA * scene.noise / (step.abs() * stiffness.sqrt()) + WAVY_PX;
+        self.sorted.extend(groups.iter().filter(|group| group.misfit <= limit).map(moved));
+        let typical = median_of_few(&mut self.sorted);
+        let noise = MANY_SIGMA * scene.noise / (step.abs() * stiffness.sqrt());
         let widen = |(count, sum): (f32, f32)| (f64::from(count), f64::from(sum));
-        let mut band_sums = BandSums {
+        let mut sums = BandSums {
             step: step.into(),
-            all_rows: float(to - from),
             before: widen(self.plain[band].before()),
             after: widen(self.plain[band].after()),
             ..BandSums::default()
         };
-        for v in from..to {
-            if self.misfits[v] <= limit && (moved(v) - typical).abs() <= far {
-                let (at, sums) = &self.sums[v];
-                band_sums.add(sums, f64::from(at - self.rows.of(v)[0]), core);
+        for group in groups {
+            let far = noise / group.weight.sqrt() + WAVY_PX;
+            let counts = group.misfit <= limit && (moved(group) - typical).abs() <= far;
+            sums.all_rows += f64::from(group.weight);
+            if counts {
+                sums.add(group, core);
             }
         }
-        band_sums
+        // Plain pixels are those of a group's mean.
+        let weight = f64::from(groups.first().map_or(1.0, |group| group.weight));
+        sums.before = (sums.before.0 * weight, sums.before.1 * weight);
+        sums.after = (sums.after.0 * weight, sums.after.1 * weight);
+        sums
     }
 
     /// Solves every band; returns whether the path was near enough for that.
@@ -338,14 +427,16 @@ impl Tracer {
         let variance = f64::from(scene.noise).powi(2);
         let core = self.template.products.matrix();
         let extra = [0, 1].map(|side| self.extra_variance(core, variance, side));
+        let plain = self.template.plain_pixels();
         self.edges.clear();
         let mut off: f64 = 0.0;
         for (band, sums) in self.solved.iter().enumerate() {
-            let located = sums.solve(core, variance, extra).map(|(moved, located)| {
+            let located = sums.solve(core, variance, extra, plain).map(|(moved, located)| {
                 let bent = moved / blur;
                 let moved = moved * (1.0 + bent * bent / 12.0);
                 off = off.max(moved.abs());
-                Located { at: f64::from(self.path[band]) + moved, ..located }
+                let [path, _, _] = self.course.at(narrow(pool::middle(scene.lines[band])));
+                Located { at: f64::from(path) + moved, ..located }
             });
             self.edges.push(located);
         }
@@ -355,7 +446,7 @@ impl Tracer {
         let places = self.edges.iter().map(|edge| edge.map(|edge| narrow(edge.at)));
         path::fill(places, &mut self.rough);
         path::median_of_three(&mut self.rough);
-        std::mem::swap(&mut self.path, &mut self.rough);
+        self.course.redraw(scene.lines, &self.rough, &mut self.memory);
         false
     }
 
@@ -390,26 +481,32 @@ impl Tracer {
 }
 
 impl BandSums {
-    /// `ahead` is how far the row was sampled beyond the path \[px\].
-    fn add(&mut self, sums: &RowSums, ahead: f64, core: &Matrix3<f64>) {
-        self.rows += 1.0;
+    fn add(&mut self, group: &Group, core: &Matrix3<f64>) {
+        let (sums, weight) = (&group.sums, f64::from(group.weight));
+        self.rows += weight;
         // The unknown is the step times the distance from the path.
-        let ahead = self.step * ahead;
-        self.vector[0] += core[(0, 0)] * ahead - f64::from(sums.slope);
-        self.vector[1] += core[(1, 0)] * ahead + f64::from(sums.before);
-        self.vector[2] += core[(2, 0)] * ahead + f64::from(sums.after);
+        let ahead = self.step * f64::from(group.ahead);
+        self.vector[0] += weight * (core[(0, 0)] * ahead - f64::from(sums.slope));
+        self.vector[1] += weight * (core[(1, 0)] * ahead + f64::from(sums.before));
+        self.vector[2] += weight * (core[(2, 0)] * ahead + f64::from(sums.after));
     }
 
     /// Place relative to the path and what is known of it; `None` without a
     /// row or an edge.
-    fn solve(&self, core: Matrix3<f64>, variance: f64, extra: [f64; 2]) -> Option<(f64, Located)> {
+    fn solve(
+        &self,
+        core: Matrix3<f64>,
+        variance: f64,
+        extra: [f64; 2],
+        plain: [f64; 2],
+    ) -> Option<(f64, Located)> {
         if self.rows < LEAST_SHARE * self.all_rows {
             return None;
         }
         let mut matrix = core * self.rows;
         let mut vector = Vector3::from(self.vector);
         for (side, (count, sum)) in [self.before, self.after].into_iter().enumerate() {
-            if count >= 1.0 {
+            if count >= LEAST_PLAIN * plain[side] * self.all_rows {
                 let weight = 1.0 / (1.0 / count + extra[side] / variance);
                 matrix[(side + 1, side + 1)] += weight;
                 vector[side + 1] += weight * sum / count;
@@ -437,13 +534,15 @@ fn level(profile: &[u16], at: f32, sign: f32, room: f32) -> f32 {
         let place = (at + sign * (near + k * apart) + 0.5) as usize;
         f32::from(profile[place.min(profile.len() - 1)])
     };
-    median_of_five(at_place(0.0), at_place(1.0), at_place(2.0), at_place(3.0), at_place(4.0))
+    median_of_five([at_place(0.0), at_place(1.0), at_place(2.0), at_place(3.0), at_place(4.0)])
 }
 
-fn median_of_five(a: f32, b: f32, c: f32, d: f32, e: f32) -> f32 {
-    let (low, high) = (a.min(b).max(c.min(d)), a.max(b).min(c.max(d)));
-    // The extremes of the four are out; the fifth lies among the rest.
-    low.min(high).max(e.min(low.max(high)))
+fn median_of_five(values: [f32; 5]) -> f32 {
+    let [first, second, third, fourth, last] = values;
+    let low = first.min(second).max(third.min(fourth));
+    let high = first.max(second).min(third.max(fourth));
+    // The extremes of the four are out; the last lies among the rest.
+    low.min(high).max(last.min(low.max(high)))
 }
 
 fn typical(values: &[f32]) -> f32 {
@@ -456,6 +555,17 @@ fn typical(values: &[f32]) -> f32 {
 #[expect(clippy::cast_possible_truncation, reason = "the quantity needs no more")]
 fn narrow(value: f64) -> f32 {
     value as f32
+}
+
+/// Median of a few values, which are sorted; 0 of none.
+fn median_of_few(values: &mut [f32]) -> f32 {
+    values.sort_unstable_by(f32::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+fn count_of(number: usize) -> f32 {
+    number as f32
 }
 
 #[expect(clippy::cast_precision_loss, reason = "a count")]

@@ -1,0 +1,131 @@
+//! Blur of an edge, from all calipers together: the profiles are laid over
+//! each other at half-pixel steps and a step of free blur is fitted.
+
+use nalgebra::{Matrix5, Vector5};
+
+use super::fit::Model;
+use super::step::StepTable;
+
+const BINS: usize = 161;
+const CENTRE: usize = BINS / 2;
+const MAX_STEPS: usize = 30;
+/// Blur of a perfectly sharp edge that is integrated over pixels and half-pixel
+/// bins.
+const LEAST_PX: f64 = 0.35;
+const MOST_PX: f64 = 15.0;
+/// Farthest that the common edge may lie from the rough ones \[px\].
+const FARTHEST_PX: f64 = 8.0;
+
+/// Profiles laid over each other about their edges.
+#[derive(Debug, Clone)]
+pub struct Overlay {
+    sums: [f64; BINS],
+    counts: [f64; BINS],
+}
+
+impl Default for Overlay {
+    fn default() -> Self {
+        Self { sums: [0.0; BINS], counts: [0.0; BINS] }
+    }
+}
+
+impl Overlay {
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Lays a sample at a distance from its edge \[px\]; what is too far is
+    /// left out.
+    pub fn add(&mut self, distance_px: f64, grey: f64) {
+        #[expect(clippy::cast_precision_loss, reason = "there are few bins")]
+        let (place, bins) = ((2.0 * distance_px).round() + CENTRE as f64, BINS as f64);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "within the bins"
+        )]
+        if place >= 0.0 && place < bins {
+            self.sums[place as usize] += grey;
+            self.counts[place as usize] += 1.0;
+        }
+    }
+
+    /// Blur of the edge \[px\]; `None` where no step can be fitted. The bead's
+    /// shading is fitted beside it, or it would pass for blur.
+    pub fn fit(&self, table: &StepTable, bead_after: bool) -> Option<f64> {
+        let (mut at, mut blur, mut shading) = (0.0, 2.0, 0.0);
+        let (mut ground, mut height) = self.levels()?;
+        for _ in 0..MAX_STEPS {
+            let mut matrix = Matrix5::<f64>::zeros();
+            let mut slope = Vector5::<f64>::zeros();
+            for (distance, grey, weight) in self.samples() {
+                let model = Model::at(table, distance - at, blur, bead_after);
+                let by_position = -height * model.density - shading * model.depth_slope;
+                let by_blur = -height * model.density * (distance - at) / blur
+                    + shading * model.density * blur;
+                let row = Vector5::new(by_position, 1.0, model.step, by_blur, model.depth);
+                let miss = grey - ground - height * model.step - shading * model.depth;
+                matrix.ger(weight, &row, &row, 1.0);
+                slope += row * (weight * miss);
+            }
+            // A little damping keeps the first steps of a soft edge in bounds.
+            for k in 0..5 {
+                matrix[(k, k)] *= 1.0 + 1e-3;
+            }
+            let step = matrix.cholesky()?.solve(&slope);
+            at += step[0].clamp(-1.0, 1.0);
+            ground += step[1];
+            height += step[2];
+            blur = (blur + step[3].clamp(-0.5 * blur, 0.5 * blur)).clamp(LEAST_PX, MOST_PX);
+            shading += step[4];
+            if step[0].abs() < 1e-4 && step[3].abs() < 1e-4 {
+                break;
+            }
+        }
+        (at.abs() < FARTHEST_PX).then_some(blur)
+    }
+
+    fn samples(&self) -> impl Iterator<Item = (f64, f64, f64)> {
+        #[expect(clippy::cast_precision_loss, reason = "there are few bins")]
+        (0..BINS).filter(|&k| self.counts[k] > 0.0).map(|k| {
+            let distance = (k as f64 - CENTRE as f64) / 2.0;
+            (distance, self.sums[k] / self.counts[k], self.counts[k])
+        })
+    }
+
+    /// Rough levels before and after the edge: the outermost bins.
+    fn levels(&self) -> Option<(f64, f64)> {
+        let first = self.samples().next()?;
+        let last = self.samples().last()?;
+        (first.0 < last.0).then_some((first.1, last.1 - first.1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_blur_comes_back() {
+        let table = StepTable::default();
+        for blur in [0.8, 1.5, 3.0, 6.0] {
+            let mut overlay = Overlay::default();
+            let half = if blur > 2.0 { 20 } else { 8 };
+            for caliper in 0..40 {
+                let at = 0.37 * f64::from(caliper);
+                for k in -half..=half {
+                    let u = at.round() + f64::from(k);
+                    overlay.add(u - at, 30.0 + 90.0 * table.at((u - at) / blur).0);
+                }
+            }
+            let found = overlay.fit(&table, true).unwrap();
+            assert!((found / blur - 1.0).abs() < 0.05, "{blur} came back as {found}");
+        }
+    }
+
+    #[test]
+    fn nothing_has_no_blur() {
+        assert_eq!(Overlay::default().fit(&StepTable::default(), true), None);
+    }
+}

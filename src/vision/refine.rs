@@ -1,0 +1,330 @@
+//! Edges that are not the blurred step between plain surroundings that a
+//! template can be made of, as on a shiny or strongly shaded strand: every
+//! caliper line is fitted for itself in a short window, with the shading of the
+//! bead free and the levels of its neighbours as prior.
+
+use super::blur::Overlay;
+use super::fit::{Edge, EdgeFit, Prior, Window};
+use super::pool;
+use super::step::StepTable;
+use super::strip::{Grey, Strip};
+use super::trace::Located;
+
+/// Neighbours on either side that tell the local slope and levels.
+const NEIGHBOURS: usize = 4;
+/// Longest half window \[px\].
+const MAX_HALF: usize = 30;
+const MIN_HALF: usize = 4;
+
+/// Where to look and how.
+#[derive(Debug, Clone, Copy)]
+pub struct Task<'a, T> {
+    /// The gauge's pixels.
+    pub strip: &'a Strip<'a, T>,
+    /// Its caliper lines: first row and the row after the last of each.
+    pub lines: &'a [(usize, usize)],
+    /// Room between the two edges of the bead \[px\], typical.
+    pub width_px: f64,
+}
+
+/// Level before the edge, height of the step, shading of the bead: what
+/// neighbouring calipers share.
+fn levels(fit: &EdgeFit) -> [f64; 3] {
+    [fit.edge.ground, fit.edge.height, fit.edge.shading]
+}
+
+/// Refines one edge of the bead; keeps its memory from frame to frame.
+#[derive(Debug, Clone, Default)]
+pub struct Refiner {
+    rough: Vec<Option<f64>>,
+    samples: Vec<f32>,
+    firsts: Vec<f64>,
+    half: usize,
+    bead_after: bool,
+    overlay: Overlay,
+    first_fits: Vec<Option<EdgeFit>>,
+    scatter: Vec<f64>,
+    /// Blur of the edge \[px\].
+    pub blur_px: f64,
+    /// Noise of a pixel \[grey levels\].
+    pub noise_grey: f64,
+}
+
+impl Refiner {
+    /// Locates the edge from rough positions, one a band; `bead_after` is the
+    /// bead's side. Returns whether any edge could be located.
+    pub fn refine<T: Grey>(
+        &mut self,
+        table: &StepTable,
+        task: &Task<'_, T>,
+        bead_after: bool,
+        edges: &mut [Option<Located>],
+        rough: impl Iterator<Item = f64>,
+    ) -> bool {
+        self.bead_after = bead_after;
+        self.rough.clear();
+        self.rough.extend(rough.map(Some));
+        self.half = half_window(3.0, task.width_px).max(8.min(widest_half(task.width_px)));
+        self.read(task);
+        let Some(blur) = self.fit_blur(table) else { return false };
+        let half = half_window(blur, task.width_px);
+        if half != self.half {
+            self.half = half;
+            self.read(task);
+        }
+        self.blur_px = blur;
+        self.locate_alone(table, task);
+        if !self.first_fits.iter().any(Option::is_some) {
+            return false;
+        }
+        self.sharpen_blur(table);
+        self.locate_with_neighbours(table, task, edges);
+        true
+    }
+
+    /// Reads the window of every band, along the local slope of the edge.
+    fn read<T: Grey>(&mut self, task: &Task<'_, T>) {
+        let length = 2 * self.half + 1;
+        self.samples.clear();
+        self.samples.resize(length * self.rough.len(), 0.0);
+        self.firsts.clear();
+        self.firsts.resize(self.rough.len(), f64::NAN);
+        for band in 0..self.rough.len() {
+            let Some(at) = self.rough[band] else { continue };
+            let slope = self.slope(band, task.lines);
+            let window = &mut self.samples[band * length..(band + 1) * length];
+            if let Some(first) = read_window(task, band, (at, slope), window) {
+                self.firsts[band] = first;
+            }
+        }
+    }
+
+    /// Slope of the rough edge about a band \[px across per px along\].
+    fn slope(&self, band: usize, lines: &[(usize, usize)]) -> f64 {
+        let from = band.saturating_sub(NEIGHBOURS);
+        let to = (band + NEIGHBOURS + 1).min(self.rough.len());
+        let near =
+            || (from..to).filter_map(|k| self.rough[k].map(|at| (pool::middle(lines[k]), at)));
+        let (mut n, mut sum_v, mut sum_u) = (0.0, 0.0, 0.0);
+        for (v, u) in near() {
+            n += 1.0;
+            sum_v += v;
+            sum_u += u;
+        }
+        let (mean_v, mean_u) = (sum_v / n, sum_u / n);
+        let (mut over, mut under) = (0.0, 0.0);
+        for (v, u) in near() {
+            over += (v - mean_v) * (u - mean_u);
+            under += (v - mean_v) * (v - mean_v);
+        }
+        if under > 0.0 { (over / under).clamp(-2.0, 2.0) } else { 0.0 }
+    }
+
+    fn window(&self, band: usize, noise: f64) -> Option<Window<'_>> {
+        let first = self.firsts[band];
+        if first.is_nan() {
+            return None;
+        }
+        let length = 2 * self.half + 1;
+        let samples = &self.samples[band * length..(band + 1) * length];
+        Some(Window { first, samples, noise, blur: self.blur_px, bead_after: self.bead_after })
+    }
+
+    fn fit_blur(&mut self, table: &StepTable) -> Option<f64> {
+        self.overlay.clear();
+        for band in 0..self.rough.len() {
+            let Some(at) = self.rough[band] else { continue };
+            self.lay_over(band, at);
+        }
+        self.overlay.fit(table, self.bead_after)
+    }
+
+    fn lay_over(&mut self, band: usize, at: f64) {
+        let first = self.firsts[band];
+        if first.is_nan() {
+            return;
+        }
+        let length = 2 * self.half + 1;
+        let window = &self.samples[band * length..(band + 1) * length];
+        for (place, &sample) in (0u32..).zip(window) {
+            self.overlay.add(first + f64::from(place) - at, f64::from(sample));
+        }
+    }
+
+    /// First pass: every caliper for itself, which also tells the noise.
+    fn locate_alone<T: Grey>(&mut self, table: &StepTable, task: &Task<'_, T>) {
+        self.first_fits.clear();
+        let (mut residual, mut freedom) = (0.0, 0.0);
+        for band in 0..self.rough.len() {
+            let fit = self.rough[band].and_then(|at| {
+                let window = self.window(band, 1.0)?;
+                window.fit(table, start_levels(&window, at), None)
+            });
+            if let Some(fit) = fit {
+                let (from, to) = task.lines[band];
+                #[expect(clippy::cast_precision_loss, reason = "windows are small")]
+                {
+                    residual += fit.residual * (to - from) as f64;
+                    freedom += (2 * self.half + 1) as f64 - 4.0;
+                }
+            }
+            self.first_fits.push(fit);
+        }
+        self.noise_grey = if freedom > 0.0 { (residual / freedom).sqrt().max(0.05) } else { 0.05 };
+    }
+
+    /// The rough positions smear the overlay; the located ones do not.
+    fn sharpen_blur(&mut self, table: &StepTable) {
+        self.overlay.clear();
+        for band in 0..self.rough.len() {
+            if let Some(fit) = self.first_fits[band] {
+                self.lay_over(band, fit.edge.at);
+            }
+        }
+        if let Some(blur) = self.overlay.fit(table, self.bead_after) {
+            self.blur_px = blur;
+        }
+    }
+
+    /// Second pass: with the levels of the neighbours as prior.
+    fn locate_with_neighbours<T: Grey>(
+        &mut self,
+        table: &StepTable,
+        task: &Task<'_, T>,
+        edges: &mut [Option<Located>],
+    ) {
+        let excess = [0, 1, 2].map(|which| self.excess_variance(which));
+        for (band, edge) in edges.iter_mut().enumerate() {
+            *edge = None;
+            let Some(alone) = self.first_fits[band] else { continue };
+            let (from, to) = task.lines[band];
+            #[expect(clippy::cast_precision_loss, reason = "a band has few rows")]
+            let noise = self.noise_grey * self.noise_grey / (to - from) as f64;
+            let prior = Prior {
+                mean: [0, 1, 2].map(|which| self.mean_near(band, which)),
+                variance: excess.map(|variance| variance.max(1e-3 * noise)),
+            };
+            let Some(window) = self.window(band, noise) else { continue };
+            let [ground, height, shading] = prior.mean;
+            let start = Edge { at: alone.edge.at, ground, height, shading };
+            *edge = window.fit(table, start, Some(&prior)).map(|fit| Located {
+                at: fit.edge.at,
+                // Levels that neighbours share are wrong for all of them
+                // together, so that the mean of many edges is no surer than
+                // if each had found its own.
+                variance: alone.variance[0] * noise,
+                height: fit.edge.height,
+                share: 1.0,
+            });
+        }
+    }
+
+    fn mean_near(&self, band: usize, which: usize) -> f64 {
+        let from = band.saturating_sub(NEIGHBOURS);
+        let to = (band + NEIGHBOURS + 1).min(self.first_fits.len());
+        let (mut sum, mut n) = (0.0, 0.0);
+        for fit in self.first_fits[from..to].iter().flatten() {
+            sum += levels(fit)[which];
+            n += 1.0;
+        }
+        sum / f64::max(n, 1.0)
+    }
+
+    /// How much a level differs from its neighbours beyond what noise
+    /// explains: the variance that the prior must allow it. Robust, from the
+    /// median of the squares.
+    fn excess_variance(&mut self, which: usize) -> f64 {
+        let mut scatter = std::mem::take(&mut self.scatter);
+        scatter.clear();
+        let (mut explained, mut n) = (0.0, 0.0);
+        for band in 0..self.first_fits.len() {
+            if let Some(fit) = &self.first_fits[band] {
+                let off = levels(fit)[which] - self.mean_near(band, which);
+                scatter.push(off * off);
+                explained += fit.variance[which + 1] * self.noise_grey * self.noise_grey;
+                n += 1.0;
+            }
+        }
+        let middle = scatter.len() / 2;
+        // 0.455 is the median of the square of a standard normal number.
+        let total = if scatter.is_empty() {
+            0.0
+        } else {
+            *scatter.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.455
+        };
+        self.scatter = scatter;
+        (total - explained / f64::max(n, 1.0)).max(0.0)
+    }
+}
+
+/// Reads a band's window: the rows are shifted by whole pixels along the
+/// slope, and what rounding leaves is moved into the position of the first
+/// sample, which is returned. `None` where the window leaves the gauge.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "positions lie within the gauge, which is checked"
+)]
+fn read_window<T: Grey>(
+    task: &Task<'_, T>,
+    band: usize,
+    (at, slope): (f64, f64),
+    window: &mut [f32],
+) -> Option<f64> {
+    let (from, to) = task.lines[band];
+    let middle = pool::middle(task.lines[band]);
+    let half = (window.len() / 2) as f64;
+    let mut left_over = 0.0;
+    for v in from..to {
+        let drift = slope * (v as f64 - middle);
+        let first = at.round() - half + drift.round();
+        left_over += drift.round() - drift;
+        if first < 0.0 || first + window.len() as f64 > task.strip.across as f64 {
+            return None;
+        }
+        let pixels = &task.strip.row(v)[first as usize..];
+        for (sum, pixel) in window.iter_mut().zip(pixels) {
+            *sum += pixel.level() as f32;
+        }
+    }
+    let rows = (to - from) as f64;
+    let scale = task.strip.scale / rows as f32;
+    for sum in window {
+        *sum *= scale;
+    }
+    Some(at.round() - half + left_over / rows)
+}
+
+/// Levels to start from: the window's two ends.
+fn start_levels(window: &Window<'_>, at: f64) -> Edge {
+    let samples = window.samples;
+    let end = samples.len().min(3);
+    #[expect(clippy::cast_precision_loss, reason = "three at most")]
+    let mean = |part: &[f32]| f64::from(part.iter().sum::<f32>()) / part.len() as f64;
+    let ground = mean(&samples[..end]);
+    let height = mean(&samples[samples.len() - end..]) - ground;
+    Edge { at, ground, height, shading: 0.0 }
+}
+
+/// Half window for a blur \[px\]: to where the step is over, but not across
+/// the bead's other edge.
+fn half_window(blur_px: f64, width_px: f64) -> usize {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a blur is a few pixels"
+    )]
+    let wanted = (4.0 * blur_px + 2.0).ceil() as usize;
+    wanted.clamp(MIN_HALF, widest_half(width_px))
+}
+
+fn widest_half(width_px: f64) -> usize {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a width in the gauge"
+    )]
+    let room = (0.45 * width_px) as usize;
+    room.clamp(MIN_HALF, MAX_HALF)
+}
