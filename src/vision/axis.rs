@@ -25,6 +25,8 @@ const MAX_END_SLANT_RAD: f64 = 0.44;
 /// Smallest radius of a bead's axis in its widths: what bends more sharply is
 /// a corner.
 const LEAST_RADIUS: f64 = 1.5;
+/// Angle over half the gauge below which a bend is a bead's waviness.
+const LEAST_TURN_RAD: f64 = 0.25;
 /// Share of the gauge on either side of its middle from which the edge points
 /// there are taken.
 const MIDDLE_SHARE: f64 = 0.125;
@@ -94,7 +96,7 @@ pub fn width(
     };
     let finite = |value: f64| Mm::new(value).map_err(|_| Reject::OffSurface);
     Ok(WidthMeasurement {
-        width: finite(sections.mean)?,
+        width: finite(sections.mean + spread.shortened)?,
         sigma: finite(spread.sigma)?,
         roughness: finite(spread.roughness)?,
         left: edge(0),
@@ -149,7 +151,9 @@ impl Scene<'_> {
     /// Refuses corners.
     fn check_bend(&self, left: &Curve, right: &Curve) -> Result<(), Reject> {
         let square = self.reach() * self.reach();
-        for (t, _) in NODES {
+        // Towards the ends a short polynomial follows waviness too eagerly.
+        for (t, _) in &NODES[1..4] {
+            let t = *t;
             let slope = f64::midpoint(left.slope(t), right.slope(t)) / self.reach();
             let bend = f64::midpoint(left.bend(t), right.bend(t)).abs() / square;
             let length = 1.0 + slope * slope;
@@ -157,7 +161,8 @@ impl Scene<'_> {
             let radius = length * length.sqrt() / bend;
             let width = (right.at(t) - left.at(t)) / length.sqrt();
             let got_widths = radius / width;
-            if got_widths < LEAST_RADIUS {
+            let turn = bend * self.reach() / length;
+            if got_widths < LEAST_RADIUS && turn > LEAST_TURN_RAD {
                 return Err(Reject::Corner { got_widths, least_widths: LEAST_RADIUS });
             }
         }
@@ -295,6 +300,9 @@ impl Sections {
 /// How sure the width is, and how rough the bead.
 struct Spread {
     sigma: f64,
+    /// What the doubt about the axis' direction takes from the width in the
+    /// mean: an axis that is off by an angle shows 1 − angle²/2 of it.
+    shortened: f64,
     roughness: f64,
 }
 
@@ -319,7 +327,9 @@ impl Spread {
         variance += Self::hidden(scene, roughness);
         let tilt = Self::tilt_variance(scene, curves, memory);
         variance += sections.oblique * sections.oblique * tilt;
-        Self { sigma: variance.sqrt(), roughness }
+        let shortened = 0.5 * sections.mean * tilt;
+        variance += 2.0 * shortened * shortened;
+        Self { sigma: variance.sqrt(), shortened, roughness }
     }
 
     /// Standard deviation of the width along the gauge, without the noise of

@@ -28,14 +28,17 @@ const LEAST_SHARE: f64 = 0.4;
 const NEED_ROWS: f64 = 0.4;
 /// Share of saturated pixels from which missing contrast is laid to light.
 const MUCH_LIGHT: f64 = 0.3;
+/// Share of the brighter side's pixels that may be saturated: noise about the
+/// end of the scale saturates half of them.
+const CUT_OFF: f64 = 0.9;
 /// Room that a search allows beyond the range of widths, for the difference
 /// between one caliper and the mean of all.
 const RANGE_SLACK: f64 = 1.5;
 /// Misfit of a blurred step from which on, if both have it, edges are located
 /// line by line: one alone is more likely covered than of another kind.
-const STRANGE: f64 = 3.2;
+const STRANGE: f64 = 2.0;
 /// The same for one edge alone.
-const VERY_STRANGE: f64 = 12.0;
+const VERY_STRANGE: f64 = 8.0;
 /// Least deviation from its neighbours that makes a caliper an outlier \[px\]:
 /// of one that many rows agree on, and of one that was fitted for itself.
 const OFF_PX: f64 = 0.3;
@@ -173,6 +176,7 @@ impl Work {
         pool::cut(strip.along, self.gauge.calipers, &mut self.lines);
         self.find_candidates();
         let pair = self.find_pair(range)?;
+        self.check_light(pair)?;
         self.trace(strip, pair)?;
         self.sort_out()?;
         self.check_contrast()?;
@@ -224,7 +228,7 @@ impl Work {
             let blur = common_blur(left, right);
             let left = self.left.trace(&self.table, &scene, blur);
             let right = self.right.trace(&self.table, &right_scene, blur);
-            if left && right && !is_strange([self.left.misfit(), self.right.misfit()]) {
+            if left && right && !is_strange([self.left.misfit, self.right.misfit]) {
                 self.least_off_px = OFF_PX;
                 return Ok(());
             }
@@ -287,6 +291,19 @@ impl Work {
             };
         }
         best
+    }
+
+    /// Refuses a picture whose brighter side is cut off at the end of the
+    /// scale: where half-way up the step is cannot be told then.
+    fn check_light(&mut self, found: Found) -> Result<(), Reject> {
+        let (lefts, rights) = found.sides(&self.ups, &self.downs);
+        let (left, right) = (&lefts.all()[found.pair.left].at, &rights.all()[found.pair.right].at);
+        let bead = f64::from(narrowest(left, right, &mut self.memory));
+        #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+        let across = self.bands.profile(0).len() as f64;
+        let bright = if found.bright { bead } else { across - bead };
+        let got = self.bands.saturated_share() * across / bright.max(1.0);
+        if got > CUT_OFF { Err(Reject::Saturated { got, limit: CUT_OFF }) } else { Ok(()) }
     }
 
     fn too_much_light(&self) -> Option<Reject> {

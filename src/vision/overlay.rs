@@ -81,14 +81,6 @@ pub struct Look {
     room: Extent,
 }
 
-impl Look {
-    /// What the step leaves of the samples, in standard deviations of their
-    /// noise; about 1 where it is what it is taken for.
-    pub fn misfit(&self) -> f64 {
-        self.noise / self.pixel_noise
-    }
-}
-
 /// An edge as the overlay shows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shape {

@@ -95,7 +95,7 @@ impl fmt::Display for Reject {
             }
             Self::Saturated { got, limit } => write!(
                 f,
-                "{:.0} % of the gauge is saturated, {:.0} % is bearable",
+                "{:.0} % of the bead or the gauge is saturated, {:.0} % is bearable",
                 got * 100.0,
                 limit * 100.0
             ),

@@ -91,6 +91,9 @@ pub struct Tracer {
     scatter: Vec<f64>,
     edges: Vec<Option<Located>>,
     refiner: Refiner,
+    /// What a row in the median leaves of the step that it is held against, in
+    /// standard deviations of its noise; about 1 where the edge is one.
+    pub misfit: f64,
     /// Blur of the edge \[px\].
     pub blur_px: f64,
     /// Variance of the whole edge's position that all places share, from
@@ -193,12 +196,6 @@ impl Tracer {
             }
         }
         true
-    }
-
-    /// How much worse than noise explains a blurred step fits the edge that was
-    /// looked at; about 1 where it is one.
-    pub fn misfit(&self) -> f64 {
-        self.seen.as_ref().map_or(1.0, Look::misfit)
     }
 
     /// Locates the edge anew, line by line, where it is not a blurred step.
@@ -357,6 +354,7 @@ impl Tracer {
         let pixels = narrow(products.pixels);
         let noise = scene.noise * scene.noise * (pixels + MANY_SIGMA * (2.0 * pixels).sqrt());
         let limit = noise.max(UNLIKE * median);
+        self.misfit = f64::from(median / (scene.noise * scene.noise * pixels)).sqrt();
         self.spread_misfits(limit);
         self.solved.clear();
         let mut first = 0;
