@@ -208,6 +208,8 @@ impl Tracer {
         }
         self.edges.clear();
         self.edges.resize(scene.lines.len(), None);
+        // A blurred step that does not fit says nothing of the place either.
+        self.course.draw(scene.bands, &self.path, &self.before, &self.step);
         let course = &self.course;
         let rough =
             scene.lines.iter().map(|&line| f64::from(course.at(narrow(pool::middle(line)))[0]));
