@@ -3,6 +3,9 @@
 //! shaded. Rows that differ from most, because a grain or a spark lies on
 //! them, are left out.
 
+use super::line::Line;
+use super::normal::Normal;
+use super::phase::{offset, split};
 use super::step::StepTable;
 use super::strip::{Grey, Strip};
 
@@ -20,13 +23,6 @@ const CORE: usize = 12;
 const UNLIKE: [f32; 2] = [2.0, 1.7];
 /// Blur that the place's rounding to half a pixel adds \[px²\].
 const ROUNDING: f64 = 1.0 / 48.0;
-
-/// Slopes of the surroundings are believed from so many standard deviations
-/// on.
-const SURE: f64 = 2.5;
-/// Mean square distance of places from their middle from which on they show a
-/// slope \[px²\].
-const STRAIGHT: f64 = 3.0;
 
 const LEAST_BLUR_PX: f64 = 0.3;
 const MOST_BLUR_PX: f64 = 15.0;
@@ -403,8 +399,7 @@ impl Overlay {
             let off = block.mean() - expected;
             let doubt = noise * noise * (variance + 1.0 / block.weight);
             // The first few pixels show the slope.
-            let known = line.weight > 0.0 && line.spread() >= STRAIGHT * line.weight;
-            if known && off.abs() > 4.0 * doubt.sqrt() + 0.006 * height {
+            if line.shows_slope() && off.abs() > 4.0 * doubt.sqrt() + 0.006 * height {
                 break;
             }
             line.join(&block);
@@ -412,138 +407,6 @@ impl Overlay {
         }
         (end, line)
     }
-}
-
-/// Running sums of a straight line.
-#[derive(Debug, Clone, Copy, Default)]
-struct Line {
-    weight: f64,
-    x: f64,
-    y: f64,
-    xx: f64,
-    xy: f64,
-}
-
-impl Line {
-    fn add(&mut self, x: f64, y: f64, weight: f64) {
-        self.weight += weight;
-        self.x += weight * x;
-        self.y += weight * y;
-        self.xx += weight * x * x;
-        self.xy += weight * x * y;
-    }
-
-    fn join(&mut self, other: &Self) {
-        self.weight += other.weight;
-        self.x += other.x;
-        self.y += other.y;
-        self.xx += other.xx;
-        self.xy += other.xy;
-    }
-
-    fn middle(&self) -> f64 {
-        self.x / self.weight
-    }
-
-    fn mean(&self) -> f64 {
-        self.y / self.weight
-    }
-
-    fn spread(&self) -> f64 {
-        self.xx - self.x * self.x / self.weight
-    }
-
-    fn slope(&self) -> f64 {
-        (self.xy - self.x * self.y / self.weight) / self.spread()
-    }
-
-    /// What the line is at a place, and its variance in units of a sample's;
-    /// a slope that has not been seen over a few pixels is taken for none,
-    /// with room for a little.
-    fn at(&self, x: f64) -> (f64, f64) {
-        if self.weight <= 0.0 {
-            return (0.0, 0.0);
-        }
-        let away = x - self.middle();
-        if self.spread() < STRAIGHT * self.weight {
-            return (self.mean(), 1.0 / self.weight);
-        }
-        (self.mean() + self.slope() * away, 1.0 / self.weight + away * away / self.spread())
-    }
-
-    /// The slope less what noise may have made of it – nothing below 2.5
-    /// standard deviations, nearly all far above –, and the variance that its
-    /// doubt leaves to the line at the edge.
-    fn sure_slope(&self, noise: f64) -> (f64, f64) {
-        if self.weight <= 0.0 || self.spread() < STRAIGHT * self.weight {
-            return (0.0, 0.0);
-        }
-        let slope = self.slope();
-        let variance = noise * noise / self.spread();
-        let sure = (1.0 - SURE * SURE * variance / (slope * slope)).max(0.0);
-        (slope * sure, sure * variance * self.middle() * self.middle())
-    }
-}
-
-/// Normal equations of a small fit.
-struct Normal<const N: usize> {
-    matrix: nalgebra::SMatrix<f64, N, N>,
-    vector: nalgebra::SVector<f64, N>,
-}
-
-impl<const N: usize> Default for Normal<N> {
-    fn default() -> Self {
-        Self { matrix: nalgebra::SMatrix::zeros(), vector: nalgebra::SVector::zeros() }
-    }
-}
-
-impl<const N: usize> Normal<N> {
-    fn add(&mut self, row: [f64; N], miss: f64, weight: f64) {
-        for i in 0..N {
-            let weighted = weight * row[i];
-            self.vector[i] += weighted * miss;
-            for (j, other) in row.iter().take(i + 1).enumerate() {
-                self.matrix[(i, j)] += weighted * other;
-            }
-        }
-    }
-
-    fn hold(&mut self, which: usize, weight: f64, miss: f64) {
-        self.matrix[(which, which)] += weight;
-        self.vector[which] += weight * miss;
-    }
-
-    fn inverse(&mut self) -> Option<nalgebra::SMatrix<f64, N, N>>
-    where
-        nalgebra::Const<N>: nalgebra::DimMin<nalgebra::Const<N>>,
-    {
-        for k in 0..N {
-            self.matrix[(k, k)] *= 1.0 + 1e-9;
-            self.matrix[(k, k)] += 1e-12;
-        }
-        self.matrix.fill_upper_triangle_with_lower_triangle();
-        Some(self.matrix.cholesky()?.inverse())
-    }
-}
-
-/// Splits a place into the pixel at or before it and the nearest of `phases`
-/// places between that and the next.
-#[inline(always)]
-pub fn split(at: f32, phases: usize) -> (isize, usize) {
-    #[expect(clippy::cast_precision_loss, reason = "there are few phases")]
-    let fine = at * phases as f32 + 0.5;
-    #[expect(clippy::cast_possible_truncation, reason = "a place near the gauge")]
-    let whole = fine as isize;
-    // Truncation is a floor but for what is left of the gauge.
-    let fine = whole - isize::from(fine < 0.0);
-    let phases = phases.cast_signed();
-    (fine.div_euclid(phases), fine.rem_euclid(phases).cast_unsigned())
-}
-
-/// Where a phase lies after its pixel \[px\].
-#[expect(clippy::cast_precision_loss, reason = "there are few phases")]
-pub fn offset(phase: usize, phases: usize) -> f64 {
-    phase as f64 / phases as f64
 }
 
 /// Pixels of a row from a place on, which may lie beyond the row's ends.

@@ -3,7 +3,8 @@
 
 use nalgebra::Matrix3;
 
-use super::overlay::{Shape, offset, split};
+use super::overlay::Shape;
+use super::phase::{offset, split};
 use super::step::StepTable;
 use super::strip::{Grey, Strip};
 

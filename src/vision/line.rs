@@ -1,0 +1,89 @@
+//! A straight line through samples, summed up block by block.
+
+/// Slopes of the surroundings are believed from so many standard deviations
+/// on.
+const SURE: f64 = 2.5;
+/// Mean square distance of places from their middle from which on they show a
+/// slope \[px²\].
+const STRAIGHT: f64 = 3.0;
+
+/// Running sums of a straight line.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Line {
+    /// Sum of the weights.
+    pub weight: f64,
+    x: f64,
+    y: f64,
+    xx: f64,
+    xy: f64,
+}
+
+impl Line {
+    /// Adds a sample.
+    pub fn add(&mut self, x: f64, y: f64, weight: f64) {
+        self.weight += weight;
+        self.x += weight * x;
+        self.y += weight * y;
+        self.xx += weight * x * x;
+        self.xy += weight * x * y;
+    }
+
+    /// Adds the samples of another.
+    pub fn join(&mut self, other: &Self) {
+        self.weight += other.weight;
+        self.x += other.x;
+        self.y += other.y;
+        self.xx += other.xx;
+        self.xy += other.xy;
+    }
+
+    /// Mean place of the samples.
+    pub fn middle(&self) -> f64 {
+        self.x / self.weight
+    }
+
+    /// Mean value of the samples.
+    pub fn mean(&self) -> f64 {
+        self.y / self.weight
+    }
+
+    fn spread(&self) -> f64 {
+        self.xx - self.x * self.x / self.weight
+    }
+
+    fn slope(&self) -> f64 {
+        (self.xy - self.x * self.y / self.weight) / self.spread()
+    }
+
+    /// Whether the samples reach far enough to show a slope.
+    pub fn shows_slope(&self) -> bool {
+        self.weight > 0.0 && self.spread() >= STRAIGHT * self.weight
+    }
+
+    /// What the line is at a place, and its variance in units of a sample's;
+    /// a slope that has not been seen over a few pixels is taken for none,
+    /// with room for a little.
+    pub fn at(&self, x: f64) -> (f64, f64) {
+        if self.weight <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let away = x - self.middle();
+        if !self.shows_slope() {
+            return (self.mean(), 1.0 / self.weight);
+        }
+        (self.mean() + self.slope() * away, 1.0 / self.weight + away * away / self.spread())
+    }
+
+    /// The slope less what noise may have made of it – nothing below 2.5
+    /// standard deviations, nearly all far above –, and the variance that its
+    /// doubt leaves to the line at the edge.
+    pub fn sure_slope(&self, noise: f64) -> (f64, f64) {
+        if !self.shows_slope() {
+            return (0.0, 0.0);
+        }
+        let slope = self.slope();
+        let variance = noise * noise / self.spread();
+        let sure = (1.0 - SURE * SURE * variance / (slope * slope)).max(0.0);
+        (slope * sure, sure * variance * self.middle() * self.middle())
+    }
+}
