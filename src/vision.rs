@@ -48,6 +48,7 @@ mod pool;
 mod refine;
 pub mod reject;
 mod scatter;
+mod sheet;
 mod step;
 mod strip;
 mod template;

@@ -6,8 +6,8 @@
 use super::line::Line;
 use super::normal::Normal;
 use super::phase::{offset, split};
+use super::sheet::Sheet;
 use super::step::StepTable;
-use super::strip::{Grey, Strip};
 
 /// Rows that are laid over each other at most.
 const ROWS: usize = 100;
@@ -32,9 +32,9 @@ const SHADING_SD: f64 = 0.02;
 
 /// Where and how an edge lies in the rows of a strip.
 pub trait Path {
-    /// Position of the edge in a row \[px\], level before it and step to the
-    /// level after it \[grey levels\].
-    fn expected(&self, v: usize) -> [f32; 3];
+    /// Position of the edge at a place along it \[px\], level before it and step
+    /// to the level after it \[grey levels\].
+    fn expected(&self, v: f32) -> [f32; 3];
 }
 
 /// Samples that are free of anything but this edge, on either side \[px\].
@@ -92,11 +92,20 @@ pub struct Shape {
     pub variance: f64,
 }
 
+/// How a window was laid down: at which phase, how far the path lies ahead of
+/// its pixel \[px\], and of how many rows it is.
+#[derive(Debug, Clone, Copy)]
+struct Laid {
+    phase: usize,
+    ahead: f32,
+    rows: f32,
+}
+
 /// Lays rows over each other; keeps its memory from frame to frame.
 #[derive(Debug, Clone)]
 pub struct Overlay {
     rows: Vec<[f32; SPAN]>,
-    phases: Vec<(usize, f32)>,
+    phases: Vec<Laid>,
     unlike: Vec<f32>,
     sorted: Vec<f32>,
     mean: [[f32; SPAN]; PHASES],
@@ -120,29 +129,35 @@ impl Default for Overlay {
 }
 
 impl Overlay {
-    /// Lays down rows along a path.
+    /// Lays down the windows along a path.
     #[inline(always)]
-    pub fn lay<T: Grey>(&mut self, strip: &Strip<'_, T>, path: &impl Path) {
-        let count = strip.along.min(ROWS);
-        self.rows.resize(count, [0.0; SPAN]);
-        self.phases.resize(count, (0, 0.0));
-        self.unlike.resize(count, 0.0);
-        let mut pixels = [T::default(); SPAN];
+    pub fn lay(&mut self, sheet: &Sheet, path: &impl Path) {
+        let windows = sheet.windows();
+        let count = windows.len().min(ROWS);
+        self.rows.clear();
+        self.phases.clear();
         for k in 0..count {
-            let v = (2 * k + 1) * strip.along / (2 * count);
-            let [at, before, step] = path.expected(v);
+            let number = (2 * k + 1) * windows.len() / (2 * count);
+            let window = &windows[number];
+            let [at, before, step] = path.expected(window.middle);
             let (place, phase) = split(at, PHASES);
+            let start = place - window.first - REACH.cast_signed();
+            let pixels = usize::try_from(start).ok().and_then(|start| {
+                sheet.pixels(number).get(start..start + SPAN)?.first_chunk::<SPAN>()
+            });
+            let Some(pixels) = pixels else { continue };
             #[expect(clippy::cast_precision_loss, reason = "a place near the gauge")]
-            let shift = at - place as f32;
-            self.phases[k] = (phase, shift);
-            fetch(strip, v, place - REACH.cast_signed(), &mut pixels);
-            let (scale, shift) = (strip.scale / step, before / step);
-            for (sample, pixel) in self.rows[k].iter_mut().zip(&pixels) {
-                #[expect(clippy::cast_precision_loss, reason = "16 bits fit a float")]
-                let level = pixel.level() as f32;
-                *sample = level * scale - shift;
+            let ahead = at - place as f32;
+            let (scale, shift) = (1.0 / step, before / step);
+            let mut row = [0.0; SPAN];
+            for (sample, pixel) in row.iter_mut().zip(pixels) {
+                *sample = pixel * scale - shift;
             }
+            self.rows.push(row);
+            self.phases.push(Laid { phase, ahead, rows: window.rows });
         }
+        self.unlike.clear();
+        self.unlike.resize(self.rows.len(), 0.0);
         self.average(f32::INFINITY);
         for many in UNLIKE {
             let limit = many * self.judge();
@@ -156,16 +171,15 @@ impl Overlay {
         self.mean = [[0.0; SPAN]; PHASES];
         self.counts = [0.0; PHASES];
         self.shifts = [0.0; PHASES];
-        for ((row, &(phase, shift)), &unlike) in
-            self.rows.iter().zip(&self.phases).zip(&self.unlike)
-        {
+        for ((row, laid), &unlike) in self.rows.iter().zip(&self.phases).zip(&self.unlike) {
             if unlike > limit {
                 continue;
             }
-            self.counts[phase] += 1.0;
-            self.shifts[phase] += shift;
+            let Laid { phase, ahead, rows } = *laid;
+            self.counts[phase] += rows;
+            self.shifts[phase] += rows * ahead;
             for (sum, sample) in self.mean[phase].iter_mut().zip(row) {
-                *sum += sample;
+                *sum += rows * sample;
             }
         }
         for ((mean, shift), count) in self.mean.iter_mut().zip(&mut self.shifts).zip(self.counts) {
@@ -180,9 +194,8 @@ impl Overlay {
     /// How far each row lies from the mean about the edge; returns the median.
     #[inline(always)]
     fn judge(&mut self) -> f32 {
-        for ((row, &(phase, _)), unlike) in self.rows.iter().zip(&self.phases).zip(&mut self.unlike)
-        {
-            let mean = &self.mean[phase];
+        for ((row, laid), unlike) in self.rows.iter().zip(&self.phases).zip(&mut self.unlike) {
+            let mean = &self.mean[laid.phase];
             let mut lanes = [0.0f32; 8];
             let core = REACH - CORE..REACH + CORE;
             for (a, b) in row[core.clone()].chunks_exact(8).zip(mean[core].chunks_exact(8)) {
@@ -406,16 +419,6 @@ impl Overlay {
             end += 2.0;
         }
         (end, line)
-    }
-}
-
-/// Pixels of a row from a place on, which may lie beyond the row's ends.
-#[inline(always)]
-pub fn fetch<T: Grey>(strip: &Strip<'_, T>, v: usize, start: isize, out: &mut [T]) {
-    let row = strip.row(v);
-    match usize::try_from(start).ok().and_then(|from| row.get(from..from + out.len())) {
-        Some(pixels) => out.copy_from_slice(pixels),
-        None => strip.fetch(v, start, out),
     }
 }
 

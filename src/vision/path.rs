@@ -195,8 +195,8 @@ impl Course {
 
 impl Path for Course {
     #[inline(always)]
-    fn expected(&self, v: usize) -> [f32; 3] {
-        self.at(float(v))
+    fn expected(&self, v: f32) -> [f32; 3] {
+        self.at(v)
     }
 }
 

@@ -47,13 +47,21 @@ impl View {
 
 /// Grey values as the measurement takes them.
 pub trait Grey: Copy + Default + PartialOrd {
+    /// What the sum of up to 128 values fits.
+    type Sum: Copy + Default;
     /// The value as a whole number.
     fn level(self) -> u32;
     /// The sum of four, without its lowest `shift` bits, which must fit 16.
     fn sum_of_four(values: [Self; 4], shift: u32) -> u16;
+    /// A sum with this value.
+    fn add_to(self, sum: Self::Sum) -> Self::Sum;
+    /// A sum as a float.
+    fn float(sum: Self::Sum) -> f32;
 }
 
 impl Grey for u8 {
+    type Sum = u16;
+
     #[inline(always)]
     fn level(self) -> u32 {
         u32::from(self)
@@ -63,9 +71,21 @@ impl Grey for u8 {
     fn sum_of_four([a, b, c, d]: [Self; 4], _: u32) -> u16 {
         (u16::from(a) + u16::from(b)) + (u16::from(c) + u16::from(d))
     }
+
+    #[inline(always)]
+    fn add_to(self, sum: u16) -> u16 {
+        sum.wrapping_add(u16::from(self))
+    }
+
+    #[inline(always)]
+    fn float(sum: u16) -> f32 {
+        f32::from(sum)
+    }
 }
 
 impl Grey for u16 {
+    type Sum = u32;
+
     #[inline(always)]
     fn level(self) -> u32 {
         u32::from(self)
@@ -75,6 +95,17 @@ impl Grey for u16 {
     fn sum_of_four([a, b, c, d]: [Self; 4], shift: u32) -> u16 {
         let sum = (u32::from(a) + u32::from(b)) + (u32::from(c) + u32::from(d));
         u16::try_from(sum >> shift).unwrap_or(u16::MAX)
+    }
+
+    #[inline(always)]
+    fn add_to(self, sum: u32) -> u32 {
+        sum.wrapping_add(u32::from(self))
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_precision_loss, reason = "23 bits fit a float")]
+    fn float(sum: u32) -> f32 {
+        sum as f32
     }
 }
 

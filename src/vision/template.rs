@@ -6,7 +6,6 @@ use nalgebra::Matrix3;
 use super::overlay::Shape;
 use super::phase::{offset, split};
 use super::step::StepTable;
-use super::strip::{Grey, Strip};
 
 /// Pixels that are taken together.
 const LANES: usize = 16;
@@ -15,8 +14,9 @@ const PHASES: usize = 8;
 /// Chunks of the core at most: a blur of 12 px and more is cut short.
 const MAX_CORE: usize = 6;
 /// Chunks of the surroundings on either side at most.
-const MAX_PLAIN: usize = 3;
-const MAX_CHUNKS: usize = MAX_CORE + 2 * MAX_PLAIN;
+const MAX_PLAIN: usize = 2;
+/// Chunks at most: what the overlay reaches, rounded up.
+const MAX_CHUNKS: usize = 6;
 /// Half the core, in blurs and pixels beside.
 const CORE_BLURS: f64 = 3.5;
 const CORE_BESIDE_PX: f64 = 1.0;
@@ -79,6 +79,12 @@ pub struct RowSums {
     pub after: f32,
     /// Pixels that lie too far off to be noise; they count as fitting.
     pub wild: f32,
+}
+
+impl RowSums {
+    /// Of a row whose edge lies beyond what was read of it.
+    pub const OUT_OF_SIGHT: Self =
+        Self { slope: 0.0, squares: 0.0, before: 0.0, after: 0.0, wild: f32::INFINITY };
 }
 
 /// Plain pixels that count and their residuals, over several rows, lane by
@@ -178,36 +184,28 @@ impl Template {
         place + phase / phases
     }
 
-    /// Holds the mean of a few neighbouring rows, from `v` on, against the
-    /// edge.
+    /// Holds a window against the edge; `None` where the edge lies too near its
+    /// end.
     #[inline(always)]
-    pub fn hold<T: Grey>(
+    pub fn hold(
         &self,
-        strip: &Strip<'_, T>,
-        (v, count): (usize, usize),
+        (pixels, first): (&[f32], isize),
         expected: &Expected,
         plain: &mut PlainSums,
-    ) -> RowSums {
+    ) -> Option<RowSums> {
         let (place, phase) = split(expected.at, PHASES);
         let reach = (self.core.start * LANES + self.core.len() * LANES / 2).cast_signed();
-        let start = place - reach;
-        let length = self.chunks * LANES;
+        let start = usize::try_from(place - reach - first).ok()?;
+        let pixels = pixels.get(start..start + self.chunks * LANES)?;
         let parts = &self.parts[phase * MAX_CHUNKS..][..self.chunks];
-        let mut sums = [0u32; MAX_CHUNKS * LANES];
-        for row in v..v + count {
-            add_row(strip, row, start, &mut sums[..length]);
-        }
-        #[expect(clippy::cast_precision_loss, reason = "a few rows")]
-        let scale = strip.scale / count as f32;
-        self.sum(parts, &sums[..length], scale, expected, plain)
+        Some(self.sum(parts, pixels, expected, plain))
     }
 
     #[inline(always)]
     fn sum(
         &self,
         parts: &[Part],
-        pixels: &[u32],
-        scale: f32,
+        pixels: &[f32],
         expected: &Expected,
         plain: &mut PlainSums,
     ) -> RowSums {
@@ -219,7 +217,7 @@ impl Template {
         let mut lanes = [[0.0f32; LANES]; 5];
         for (part, pixels) in core.iter().zip(pixels_core.chunks_exact(LANES)) {
             for k in 0..LANES {
-                let miss = residual(part, k, pixels[k], scale, expected) * part.mask[k];
+                let miss = residual(part, k, pixels[k], expected) * part.mask[k];
                 let wild = if miss.abs() > expected.tolerance_at_step { 1.0 } else { 0.0 };
                 let miss = miss * (1.0 - wild);
                 lanes[4][k] += wild;
@@ -234,40 +232,17 @@ impl Template {
         sums.after = total(&lanes[3]);
         sums.before = total(&lanes[2]) - sums.after;
         sums.wild = total(&lanes[4]);
-        add_plain(before, pixels_before, scale, expected, &mut plain.before);
-        add_plain(after, pixels_after, scale, expected, &mut plain.after);
+        add_plain(before, pixels_before, expected, &mut plain.before);
+        add_plain(after, pixels_after, expected, &mut plain.after);
         sums
     }
 }
 
 #[inline(always)]
-fn add_row<T: Grey>(strip: &Strip<'_, T>, v: usize, start: isize, sums: &mut [u32]) {
-    let row = strip.row(v);
-    let within = usize::try_from(start).ok().and_then(|from| row.get(from..from + sums.len()));
-    if let Some(pixels) = within {
-        for (sum, pixel) in sums.iter_mut().zip(pixels) {
-            *sum += pixel.level();
-        }
-    } else {
-        let mut pixels = [T::default(); MAX_CHUNKS * LANES];
-        strip.fetch(v, start, &mut pixels[..sums.len()]);
-        for (sum, pixel) in sums.iter_mut().zip(&pixels) {
-            *sum += pixel.level();
-        }
-    }
-}
-
-#[inline(always)]
-fn add_plain(
-    parts: &[Part],
-    pixels: &[u32],
-    scale: f32,
-    expected: &Expected,
-    [count, sum]: &mut [Chunk; 2],
-) {
+fn add_plain(parts: &[Part], pixels: &[f32], expected: &Expected, [count, sum]: &mut [Chunk; 2]) {
     for (part, pixels) in parts.iter().zip(pixels.chunks_exact(LANES)) {
         for k in 0..LANES {
-            let miss = residual(part, k, pixels[k], scale, expected);
+            let miss = residual(part, k, pixels[k], expected);
             let counts = if miss.abs() <= expected.tolerance { part.mask[k] } else { 0.0 };
             count[k] += counts;
             sum[k] += counts * miss;
@@ -276,10 +251,8 @@ fn add_plain(
 }
 
 #[inline(always)]
-fn residual(part: &Part, k: usize, pixel: u32, scale: f32, expected: &Expected) -> f32 {
-    #[expect(clippy::cast_precision_loss, reason = "a few 16-bit values fit a float")]
-    let level = pixel as f32;
-    level * scale - expected.before - expected.step * part.step[k]
+fn residual(part: &Part, k: usize, pixel: f32, expected: &Expected) -> f32 {
+    pixel - expected.before - expected.step * part.step[k]
 }
 
 #[inline(always)]

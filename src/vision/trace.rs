@@ -9,6 +9,7 @@ use super::overlay::{Extent, Look, Overlay, REACH, Shape, Step};
 use super::path::{self, Course};
 use super::pool::{self, Bands};
 use super::refine::{Refiner, Task};
+use super::sheet::Sheet;
 use super::step::StepTable;
 use super::strip::{Grey, Strip};
 use super::template::{Expected, PlainSums, RowSums, Template};
@@ -16,6 +17,8 @@ use super::template::{Expected, PlainSums, RowSums, Template};
 /// Passes over the rows at most; a second one is made only where the first
 /// path was off by a good part of the blur.
 const MAX_PASSES: usize = 3;
+/// Distance of the path from the edge from which on pixels are read anew \[px\].
+const FAR_ASIDE_PX: f64 = 4.0;
 /// Share of the blur by which a path may be off.
 const NEAR_ENOUGH: f64 = 0.3;
 /// Standard deviations beyond which a pixel or a row is not noise.
@@ -24,11 +27,6 @@ const MANY_SIGMA: f32 = 4.5;
 const UNLIKE: f32 = 2.5;
 /// Rows of a band may differ by this much beside their noise \[px\].
 const WAVY_PX: f32 = 0.5;
-/// Rows from which on some are taken together, as many at most, and how far an
-/// edge may run aside within them \[px\].
-const PLENTY: usize = 120;
-const MOST_TOGETHER: usize = 4;
-const STRAIGHT_PX: f32 = 0.6;
 /// Wild pixels that a row may have; more are a grain.
 const FEW_WILD: f32 = 2.0;
 /// Share of the plain pixels that must be as they are expected for their level
@@ -81,6 +79,7 @@ pub struct Tracer {
     step: Vec<f32>,
     course: Course,
     groups: Vec<Group>,
+    sheet: Sheet,
     overlay: Overlay,
     seen: Option<Look>,
     template: Template,
@@ -167,7 +166,8 @@ impl Tracer {
         std::mem::swap(&mut self.rough, &mut self.path);
         self.pick_levels(scene);
         self.course.draw(scene.bands, &self.path, &self.before, &self.step);
-        self.overlay.lay(scene.strip, &self.course);
+        self.read(scene);
+        self.overlay.lay(&self.sheet, &self.course);
         let noise = f64::from(scene.noise) / f64::from(typical(&self.step).abs());
         self.seen = self.overlay.look(table, noise, self.room(scene));
         self.seen.map(|seen| (seen.step.blur, seen.blur_sd))
@@ -184,7 +184,11 @@ impl Tracer {
     ) -> bool {
         let Some(seen) = &self.seen else { return false };
         let Some(shape) = self.overlay.shape(table, seen, blur) else { return false };
+        let aside = shape.step.at;
         let shape = self.adopt(shape);
+        if aside.abs() > FAR_ASIDE_PX {
+            self.read(scene);
+        }
         self.blur_px = shape.step.blur;
         self.common_variance = shape.variance;
         self.template.tabulate(table, &shape);
@@ -291,47 +295,40 @@ impl Tracer {
         }
     }
 
-    /// Rows that are taken together: one where there are few, more where a
-    /// tall gauge has plenty, as long as the edge runs straight through them.
-    fn rows_together<T: Grey>(&self, scene: &Scene<'_, T>) -> usize {
-        let plenty = (scene.strip.along / PLENTY).clamp(1, MOST_TOGETHER);
-        let straight = STRAIGHT_PX / self.course.steepest().max(1e-3);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "positive; what is large is cut to a few"
-        )]
-        let straight = straight as usize;
-        plenty.min(straight.max(1))
+    /// Reads the pixels along the path.
+    #[inline(always)]
+    fn read<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        let course = &self.course;
+        self.sheet.read(scene.strip, scene.lines, course.steepest(), |v| course.at(v)[0]);
     }
 
-    /// Holds every row against the edge.
+    /// Holds every window against the edge.
     #[inline(always)]
     fn hold<T: Grey>(&mut self, scene: &Scene<'_, T>) {
-        let together = self.rows_together(scene);
         self.groups.clear();
         self.plain.clear();
-        for (band, &(from, to)) in scene.lines.iter().enumerate() {
-            let mut v = from;
-            let mut plain = PlainSums::default();
-            while v < to {
-                let rows = together.min(to - v);
-                let weight = count_of(rows);
-                let [path, before, step] = self.course.at(count_of(2 * v + rows - 1) / 2.0);
-                let at = Template::sampled(path);
-                let noise = MANY_SIGMA * scene.noise / weight.sqrt();
-                let expected = Expected {
-                    at,
-                    before,
-                    step,
-                    tolerance: noise + 0.05 * step.abs(),
-                    tolerance_at_step: noise + 0.15 * step.abs(),
-                };
-                let sums = self.template.hold(scene.strip, (v, rows), &expected, &mut plain);
-                self.groups.push(Group { band, weight, ahead: at - path, sums, misfit: 0.0 });
-                v += rows;
-            }
-            self.plain.push(plain);
+        self.plain.resize(scene.lines.len(), PlainSums::default());
+        for (number, window) in self.sheet.windows().iter().enumerate() {
+            let [path, before, step] = self.course.at(window.middle);
+            let at = Template::sampled(path);
+            let noise = MANY_SIGMA * scene.noise / window.rows.sqrt();
+            let expected = Expected {
+                at,
+                before,
+                step,
+                tolerance: noise + 0.05 * step.abs(),
+                tolerance_at_step: noise + 0.15 * step.abs(),
+            };
+            let pixels = (self.sheet.pixels(number).as_slice(), window.first);
+            let plain = &mut self.plain[window.line];
+            let sums = self.template.hold(pixels, &expected, plain);
+            self.groups.push(Group {
+                band: window.line,
+                weight: window.rows,
+                ahead: at - path,
+                sums: sums.unwrap_or(RowSums::OUT_OF_SIGHT),
+                misfit: 0.0,
+            });
         }
     }
 
@@ -447,6 +444,7 @@ impl Tracer {
         path::fill(places, &mut self.rough);
         path::median_of_three(&mut self.rough);
         self.course.redraw(scene.lines, &self.rough, &mut self.memory);
+        self.read(scene);
         false
     }
 
@@ -561,11 +559,6 @@ fn narrow(value: f64) -> f32 {
 fn median_of_few(values: &mut [f32]) -> f32 {
     values.sort_unstable_by(f32::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
-#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-fn count_of(number: usize) -> f32 {
-    number as f32
 }
 
 #[expect(clippy::cast_precision_loss, reason = "a count")]

@@ -1,0 +1,142 @@
+//! The gauge straightened along an edge: the pixels around it, one window a few
+//! rows, read once and held against the edge as often as it takes.
+
+use super::strip::{Grey, Strip};
+
+/// Pixels of a window.
+pub const SPAN: usize = 112;
+/// Pixel of a window at which the edge is expected.
+pub const MIDDLE: usize = SPAN / 2;
+
+/// Rows of a gauge from which on those of a caliper line are taken together, as
+/// many at most, and how far an edge may run aside within them \[px\].
+const PLENTY: usize = 160;
+const MOST_TOGETHER: usize = 8;
+const STRAIGHT_PX: f32 = 0.6;
+
+/// A window: the mean of a few neighbouring rows \[grey levels of 256\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Window {
+    /// Caliper line that the rows belong to.
+    pub line: usize,
+    /// Number of rows.
+    pub rows: f32,
+    /// Their middle along the bead \[px\].
+    pub middle: f32,
+    /// Place across the bead of the first pixel \[px\].
+    pub first: isize,
+}
+
+/// Windows along an edge; keeps its memory from frame to frame.
+#[derive(Debug, Clone, Default)]
+pub struct Sheet {
+    windows: Vec<Window>,
+    pixels: Vec<[f32; SPAN]>,
+}
+
+impl Sheet {
+    /// What the windows are of.
+    pub fn windows(&self) -> &[Window] {
+        &self.windows
+    }
+
+    /// The pixels of a window \[grey levels of 256\].
+    #[inline(always)]
+    pub fn pixels(&self, window: usize) -> &[f32; SPAN] {
+        &self.pixels[window]
+    }
+
+    /// Reads the windows about an edge that runs through `at`, a place across
+    /// the bead for one along it, and nowhere runs aside more than `steepest`.
+    /// Rows are taken together within caliper lines: one where there are few,
+    /// more where a tall gauge has plenty.
+    #[inline(always)]
+    pub fn read<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        lines: &[(usize, usize)],
+        steepest: f32,
+        at: impl Fn(f32) -> f32,
+    ) {
+        let together = rows_together(strip.along, lines.len(), steepest);
+        self.windows.clear();
+        for (line, &(from, to)) in lines.iter().enumerate() {
+            let mut v = from;
+            while v < to {
+                let rows = together.min(to - v);
+                let middle = float(2 * v + rows - 1) / 2.0;
+                let first = floor(at(middle)) - MIDDLE.cast_signed();
+                self.windows.push(Window { line, rows: float(rows), middle, first });
+                v += rows;
+            }
+        }
+        self.pixels.resize(self.windows.len(), [0.0; SPAN]);
+        let mut v = 0;
+        for (window, pixels) in self.windows.iter().zip(&mut self.pixels) {
+            let end = v + count(window.rows);
+            average(strip, v..end, window.first, pixels);
+            v = end;
+        }
+    }
+}
+
+/// Rows that are taken together.
+fn rows_together(along: usize, lines: usize, steepest: f32) -> usize {
+    if along <= PLENTY {
+        return 1;
+    }
+    let straight = count(STRAIGHT_PX / steepest.max(1e-3));
+    along.div_ceil(lines.max(1)).min(straight).clamp(1, MOST_TOGETHER)
+}
+
+/// Mean of some rows from a place on.
+#[inline(always)]
+fn average<T: Grey>(
+    strip: &Strip<'_, T>,
+    rows: std::ops::Range<usize>,
+    first: isize,
+    out: &mut [f32; SPAN],
+) {
+    let scale = strip.scale / float(rows.len());
+    let mut sums = [T::Sum::default(); SPAN];
+    for v in rows {
+        let row = strip.row(v);
+        let within = usize::try_from(first).ok().and_then(|from| row.get(from..from + SPAN));
+        if let Some(pixels) = within.and_then(<[T]>::first_chunk) {
+            add(pixels, &mut sums);
+        } else {
+            let mut pixels = [T::default(); SPAN];
+            strip.fetch(v, first, &mut pixels);
+            add(&pixels, &mut sums);
+        }
+    }
+    for (out, sum) in out.iter_mut().zip(sums) {
+        *out = scale * T::float(sum);
+    }
+}
+
+#[inline(always)]
+fn add<T: Grey>(pixels: &[T; SPAN], sums: &mut [T::Sum; SPAN]) {
+    for k in 0..SPAN {
+        sums[k] = pixels[k].add_to(sums[k]);
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+fn float(number: usize) -> f32 {
+    number as f32
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "a place near the gauge")]
+fn floor(at: f32) -> isize {
+    at.floor() as isize
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "positive; what is large is cut to a few"
+)]
+fn count(number: f32) -> usize {
+    number as usize
+}
