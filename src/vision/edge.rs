@@ -5,7 +5,7 @@
 pub const REACH: usize = 4;
 
 /// Places that are passed over together where nothing reaches the floor.
-const BLOCK: usize = 64;
+const BLOCK: usize = 32;
 
 /// Steps of each sign that are kept a profile.
 pub const KEPT: usize = 16;
@@ -55,15 +55,13 @@ impl Candidates {
         #[expect(clippy::cast_possible_truncation, reason = "saturates")]
         let floor = (floor / unit).ceil() as i16;
         let last = response.len().saturating_sub(1);
-        let mut start = 0;
-        for block in response.chunks(BLOCK) {
-            let end = start + block.len();
-            if strongest(block) >= floor {
-                for u in start.max(1)..end.min(last) {
+        for (number, block) in response.chunks(BLOCK).enumerate() {
+            if reaches(block, floor) {
+                let start = number * BLOCK;
+                for u in start.max(1)..(start + block.len()).min(last) {
                     found.look_at([response[u - 1], response[u], response[u + 1]], u, floor, unit);
                 }
             }
-            start = end;
         }
         found
     }
@@ -80,14 +78,14 @@ impl Candidates {
     }
 }
 
-/// Size of the strongest response.
+/// Whether any response is as strong as the floor.
 #[inline(always)]
-fn strongest(block: &[i16]) -> i16 {
-    let mut strongest = 0;
+fn reaches(block: &[i16], floor: i16) -> bool {
+    let mut any = 0;
     for value in block {
-        strongest = strongest.max(value.abs());
+        any |= i16::from(value.abs() >= floor);
     }
-    strongest
+    any != 0
 }
 
 /// Sum of the REACH pixels after each place less the sum of those before it:

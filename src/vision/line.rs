@@ -20,6 +20,7 @@ pub struct Line {
 
 impl Line {
     /// Adds a sample.
+    #[inline(always)]
     pub fn add(&mut self, x: f64, y: f64, weight: f64) {
         self.weight += weight;
         self.x += weight * x;

@@ -53,7 +53,7 @@ const MAX_SCATTER_PX: f64 = 1.5;
 
 /// Steps that noise alone makes are passed over up to so many of its standard
 /// deviations.
-const FLOOR_SIGMA: f32 = 3.0;
+const FLOOR_SIGMA: f32 = 3.5;
 
 /// Measures frames of one cell; keeps its memory from frame to frame.
 #[derive(Debug, Clone)]
@@ -80,6 +80,7 @@ struct Work {
     left: Tracer,
     right: Tracer,
     least_off_px: f64,
+    contrasts: [f64; 2],
     scatter: Vec<f64>,
     middles: Vec<f64>,
     axis: axis::Memory,
@@ -105,6 +106,7 @@ impl Measurer {
             left: Tracer::default(),
             right: Tracer::default(),
             least_off_px: OFF_PX,
+            contrasts: [0.0; 2],
             scatter: Vec::new(),
             middles: Vec::new(),
             axis: axis::Memory::default(),
@@ -171,7 +173,7 @@ impl Work {
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
         let range = self.search_range(view, surface)?;
-        self.noise = noise::of(strip, 0..strip.across, &mut self.memory);
+        self.noise = noise::of(strip, 0..strip.across);
         self.bands.pool(strip, self.gauge.calipers);
         pool::cut(strip.along, self.gauge.calipers, &mut self.lines);
         self.find_candidates();
@@ -211,7 +213,7 @@ impl Work {
         let (lefts, rights) = pair.sides(&self.ups, &self.downs);
         let (lefts, rights) = (&lefts.all()[pair.pair.left].at, &rights.all()[pair.pair.right].at);
         let about = about(lefts, rights, strip.across);
-        self.noise = noise::of(strip, about, &mut self.memory);
+        self.noise = noise::of(strip, about);
         let scene = Scene {
             strip,
             bands: &self.bands,
@@ -331,7 +333,8 @@ impl Work {
 
     fn check_contrast(&mut self) -> Result<(), Reject> {
         let need = self.gauge.min_contrast_grey;
-        let got = self.contrast(true).min(self.contrast(false));
+        self.contrasts = [self.contrast(true), self.contrast(false)];
+        let got = self.contrasts[0].min(self.contrasts[1]);
         if got < need {
             return Err(self.too_much_light().unwrap_or(Reject::LowContrast { got, need }));
         }
@@ -352,7 +355,7 @@ impl Work {
 
     fn width_on(&mut self, view: &View, surface: &SurfaceMap) -> Result<WidthMeasurement, Reject> {
         let hints = Hints {
-            contrast_grey: f64::midpoint(self.contrast(true), self.contrast(false)),
+            contrast_grey: f64::midpoint(self.contrasts[0], self.contrasts[1]),
             blur_px: f64::midpoint(self.left.blur_px, self.right.blur_px),
             noise_grey: self.noise.into(),
             saturated_share: self.bands.saturated_share(),

@@ -5,10 +5,10 @@ use std::ops::Range;
 
 use super::strip::{Grey, Strip};
 
-/// Rows and places in each that are looked at.
+/// Rows that are looked at, and neighbouring pixels in each.
 const ROWS: usize = 32;
-const PLACES: usize = 30;
-/// Distance of the neighbours \[px\].
+const RUN: usize = 32;
+/// Distance of the neighbours along the bead \[px\].
 const APART: usize = 1;
 /// Differences beyond so many medians are edges and grains.
 const FEW_MEDIANS: f32 = 4.5;
@@ -19,37 +19,65 @@ const KEPT_VARIANCE: f32 = 0.976;
 const LEAST: f32 = 0.2887;
 
 /// Standard deviation of a pixel in some columns \[grey levels of 256\].
-/// `memory` is scratch.
-pub fn of<T: Grey>(strip: &Strip<'_, T>, columns: Range<usize>, memory: &mut Vec<f32>) -> f32 {
-    memory.clear();
+#[inline(always)]
+pub fn of<T: Grey>(strip: &Strip<'_, T>, columns: Range<usize>) -> f32 {
     let room = strip.along.saturating_sub(APART);
-    let across = columns.len();
-    let (rows, places) = (room.min(ROWS), across.min(PLACES));
+    let (rows, run) = (room.min(ROWS), columns.len().min(RUN));
+    let slots = columns.len() - run;
+    let mut differences = [u16::MAX; ROWS * RUN];
     for k in 0..rows {
         let v = (2 * k + 1) * room / (2 * rows);
+        // Another place in each row: 13 has no divisor in common with ROWS.
+        let first = columns.start + 13 * k % ROWS * slots / ROWS;
         let (row, other) = (strip.row(v), strip.row(v + APART));
-        // Another set of columns in each row, lest a pattern be missed.
-        let first = 7 * k * across / (PLACES * rows);
-        for j in 0..places {
-            let u = columns.start + (first + (2 * j + 1) * across / (2 * places)) % across;
-            #[expect(clippy::cast_precision_loss, reason = "16 bits fit a float")]
-            memory.push(row[u].level().abs_diff(other[u].level()) as f32);
+        let pixels = row[first..first + run].iter().zip(&other[first..first + run]);
+        for (difference, (here, there)) in differences[k * RUN..].iter_mut().zip(pixels) {
+            *difference = here.away_from(*there);
         }
     }
     let least = LEAST * strip.scale;
-    if memory.is_empty() {
-        return least;
+    if rows * run == 0 {
+        least
+    } else {
+        (strip.scale * spread(&differences, rows * run)).max(least)
     }
-    let middle = memory.len() / 2;
-    let median = *memory.select_nth_unstable_by(middle, f32::total_cmp).1;
+}
+
+/// Standard deviation behind `total` differences, of which those that are
+/// noise's count; the rest of the list is larger than any.
+#[inline(always)]
+fn spread(differences: &[u16; ROWS * RUN], total: usize) -> f32 {
+    let mut median = 0;
+    for bit in (0..16).rev() {
+        let below = (1 << bit) + median;
+        if 2 * count_below(differences, below) <= total {
+            median = below;
+        }
+    }
     // The median of rounded differences is coarse; the mean square is not.
-    let limit = FEW_MEDIANS * (median + 0.25);
-    let (mut sum, mut n) = (0.0, 0.0);
-    for &difference in memory.iter().filter(|&&difference| difference <= limit) {
-        sum += difference * difference;
-        n += 1.0;
+    let limit = FEW_MEDIANS * (f32::from(median) + 0.25);
+    let (mut sums, mut counts) = ([0.0f32; 16], [0.0f32; 16]);
+    for few in differences.chunks_exact(16) {
+        for k in 0..16 {
+            let difference = f32::from(few[k]);
+            let counts_too = if difference <= limit { 1.0 } else { 0.0 };
+            sums[k] += counts_too * difference * difference;
+            counts[k] += counts_too;
+        }
     }
-    (strip.scale * (sum / f32::max(n, 1.0) / (2.0 * KEPT_VARIANCE)).sqrt()).max(least)
+    let (sum, n) = (sums.iter().sum::<f32>(), counts.iter().sum::<f32>());
+    (sum / n.max(1.0) / (2.0 * KEPT_VARIANCE)).sqrt()
+}
+
+#[inline(always)]
+fn count_below(differences: &[u16; ROWS * RUN], limit: u16) -> usize {
+    let mut counts = [0u16; RUN];
+    for few in differences.chunks_exact(RUN) {
+        for k in 0..RUN {
+            counts[k] += u16::from(few[k] < limit);
+        }
+    }
+    counts.iter().map(|&count| usize::from(count)).sum()
 }
 
 #[cfg(test)]
@@ -85,7 +113,7 @@ mod tests {
             let view = View::new(Roi { x: 0, y: 0, width: 300, height: 200 }, Axis::Vertical);
             let mut turner = Turner::default();
             let Strips::Bytes(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
-            let found = f64::from(of(&strip, 0..300, &mut Vec::new()));
+            let found = f64::from(of(&strip, 0..300));
             let expected = (sigma * sigma + 1.0 / 12.0).sqrt();
             assert!((found / expected - 1.0).abs() < 0.08, "{sigma}: {found}");
         }

@@ -1,20 +1,23 @@
 //! Normal equations of fits with few unknowns.
 
+use nalgebra::{Cholesky, SMatrix, SVector};
+
 /// Normal equations of a small fit.
 pub struct Normal<const N: usize> {
-    matrix: nalgebra::SMatrix<f64, N, N>,
+    matrix: SMatrix<f64, N, N>,
     /// Right-hand side.
-    pub vector: nalgebra::SVector<f64, N>,
+    pub vector: SVector<f64, N>,
 }
 
 impl<const N: usize> Default for Normal<N> {
     fn default() -> Self {
-        Self { matrix: nalgebra::SMatrix::zeros(), vector: nalgebra::SVector::zeros() }
+        Self { matrix: SMatrix::zeros(), vector: SVector::zeros() }
     }
 }
 
 impl<const N: usize> Normal<N> {
     /// Adds an observation: its derivatives, what it misses, its weight.
+    #[inline(always)]
     pub fn add(&mut self, row: [f64; N], miss: f64, weight: f64) {
         for i in 0..N {
             let weighted = weight * row[i];
@@ -31,8 +34,8 @@ impl<const N: usize> Normal<N> {
         self.vector[which] += weight * miss;
     }
 
-    /// The inverse of the matrix, `None` where it has none.
-    pub fn inverse(&mut self) -> Option<nalgebra::SMatrix<f64, N, N>>
+    /// Solves them; `None` where they have no solution.
+    pub fn solve(&mut self) -> Option<Solved<N>>
     where
         nalgebra::Const<N>: nalgebra::DimMin<nalgebra::Const<N>>,
     {
@@ -40,7 +43,24 @@ impl<const N: usize> Normal<N> {
             self.matrix[(k, k)] *= 1.0 + 1e-9;
             self.matrix[(k, k)] += 1e-12;
         }
-        self.matrix.fill_upper_triangle_with_lower_triangle();
-        Some(self.matrix.cholesky()?.inverse())
+        let cholesky = Cholesky::new(self.matrix)?;
+        let unknowns = cholesky.solve(&self.vector);
+        Some(Solved { unknowns, cholesky })
+    }
+}
+
+/// Solved equations.
+pub struct Solved<const N: usize> {
+    /// The unknowns.
+    pub unknowns: SVector<f64, N>,
+    cholesky: Cholesky<f64, nalgebra::Const<N>>,
+}
+
+impl<const N: usize> Solved<N> {
+    /// Variance of an unknown, for observations of variance 1.
+    pub fn variance(&self, which: usize) -> f64 {
+        let mut one = SVector::<f64, N>::zeros();
+        one[which] = 1.0;
+        self.cholesky.solve(&one)[which]
     }
 }

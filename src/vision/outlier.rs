@@ -12,16 +12,22 @@ const MANY_SIGMA: f64 = 5.0;
 /// scratch; `least_px` is the least deviation that makes an outlier.
 pub fn sort_out(edges: &mut [Option<Located>], least_px: f64, memory: &mut Vec<f64>) -> f64 {
     memory.clear();
-    memory.extend((0..edges.len()).filter_map(|k| deviation(edges, k)).map(f64::abs));
-    if memory.is_empty() {
+    memory.extend((0..edges.len()).map(|k| deviation(edges, k).unwrap_or(f64::NAN)));
+    // A second copy is what the median is found in.
+    for k in 0..edges.len() {
+        let deviation = memory[k];
+        if !deviation.is_nan() {
+            memory.push(deviation.abs());
+        }
+    }
+    let (deviations, sizes) = memory.split_at_mut(edges.len());
+    if sizes.is_empty() {
         return 0.0;
     }
-    let middle = memory.len() / 2;
-    let sigma = 1.4826 * *memory.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let middle = sizes.len() / 2;
+    let sigma = 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
     let limit = least_px.max(MANY_SIGMA * sigma);
-    memory.clear();
-    memory.extend((0..edges.len()).map(|k| deviation(edges, k).unwrap_or(0.0)));
-    for (edge, deviation) in edges.iter_mut().zip(memory.iter()) {
+    for (edge, deviation) in edges.iter_mut().zip(deviations) {
         if deviation.abs() > limit {
             *edge = None;
         }

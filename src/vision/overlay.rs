@@ -3,6 +3,8 @@
 //! shaded. Rows that differ from most, because a grain or a spark lies on
 //! them, are left out.
 
+use std::ops::Range;
+
 use super::line::Line;
 use super::normal::Normal;
 use super::phase::{offset, split};
@@ -18,6 +20,7 @@ const SPAN: usize = 2 * REACH;
 const PHASES: usize = 2;
 /// Samples this near the edge tell whether a row is like the others \[px\].
 const CORE: usize = 12;
+const JUDGED: Range<usize> = REACH - CORE..REACH + CORE;
 /// A row that differs from the mean by so many times what rows do in the
 /// median is left out; the second time, when the mean is a better one.
 const UNLIKE: [f32; 2] = [2.0, 1.7];
@@ -27,6 +30,9 @@ const ROUNDING: f64 = 1.0 / 48.0;
 const LEAST_BLUR_PX: f64 = 0.3;
 const MOST_BLUR_PX: f64 = 15.0;
 const MAX_STEPS: usize = 16;
+/// A step \[px, or blurs\] after which another would change next to nothing: each
+/// squares what is left.
+const CONVERGED: f64 = 2e-3;
 /// Shading that is usual close to an edge, as a standard deviation \[1/px\].
 const SHADING_SD: f64 = 0.02;
 
@@ -158,16 +164,17 @@ impl Overlay {
         }
         self.unlike.clear();
         self.unlike.resize(self.rows.len(), 0.0);
-        self.average(f32::INFINITY);
-        for many in UNLIKE {
-            let limit = many * self.judge();
-            self.average(limit);
-        }
+        self.average(f32::INFINITY, JUDGED);
+        let [first, last] = UNLIKE;
+        let limit = first * self.judge();
+        self.average(limit, JUDGED);
+        let limit = last * self.judge();
+        self.average(limit, 0..SPAN);
     }
 
-    /// Means of the rows that are not unlike the others.
+    /// Means of the rows that are not unlike the others, in some columns.
     #[inline(always)]
-    fn average(&mut self, limit: f32) {
+    fn average(&mut self, limit: f32, columns: Range<usize>) {
         self.mean = [[0.0; SPAN]; PHASES];
         self.counts = [0.0; PHASES];
         self.shifts = [0.0; PHASES];
@@ -178,7 +185,8 @@ impl Overlay {
             let Laid { phase, ahead, rows } = *laid;
             self.counts[phase] += rows;
             self.shifts[phase] += rows * ahead;
-            for (sum, sample) in self.mean[phase].iter_mut().zip(row) {
+            let sums = self.mean[phase][columns.clone()].iter_mut();
+            for (sum, sample) in sums.zip(&row[columns.clone()]) {
                 *sum += rows * sample;
             }
         }
@@ -197,8 +205,7 @@ impl Overlay {
         for ((row, laid), unlike) in self.rows.iter().zip(&self.phases).zip(&mut self.unlike) {
             let mean = &self.mean[laid.phase];
             let mut lanes = [0.0f32; 8];
-            let core = REACH - CORE..REACH + CORE;
-            for (a, b) in row[core.clone()].chunks_exact(8).zip(mean[core].chunks_exact(8)) {
+            for (a, b) in row[JUDGED].chunks_exact(8).zip(mean[JUDGED].chunks_exact(8)) {
                 for k in 0..8 {
                     let miss = a[k] - b[k];
                     lanes[k] += miss * miss;
@@ -221,6 +228,7 @@ impl Overlay {
     }
 
     /// Each sample's distance from the path, its value and its weight.
+    #[inline(always)]
     fn samples(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64, f64)> {
         (0..PHASES).filter(|&phase| self.counts[phase] > 0.0).flat_map(move |phase| {
             let shift = f64::from(self.shifts[phase]);
@@ -237,6 +245,7 @@ impl Overlay {
     /// Looks at the edge. `noise` is the standard deviation of a pixel as a
     /// share of the step, `room` how far to look. `None` where no step can be
     /// fitted.
+    #[inline(always)]
     pub fn look(&self, table: &StepTable, noise: f64, room: Extent) -> Option<Look> {
         let (slope, at) = self.steepest(room)?;
         let blur = (0.2 / slope).clamp(0.5, MOST_BLUR_PX);
@@ -250,6 +259,7 @@ impl Overlay {
 
     /// Reads the edge's shape from a look at it and what is known of its blur:
     /// mean and standard deviation \[px\].
+    #[inline(always)]
     pub fn shape(&self, table: &StepTable, look: &Look, blur: (f64, f64)) -> Option<Shape> {
         let look = self.fit(table, *look, Some(blur))?;
         let Look { step, noise, room, .. } = look;
@@ -270,56 +280,64 @@ impl Overlay {
     }
 
     /// Steepest slope of the overlay near the path \[1/px\], and where.
+    #[inline(always)]
     fn steepest(&self, room: Extent) -> Option<(f64, f64)> {
-        let (from, to) = (-room.before.min(8.0), room.after.min(8.0));
-        let mut best = (0.0, 0.0);
-        for (distance, _, _) in self.samples(from, to) {
-            let slope = self.slope(distance);
+        let (from, to) = (halves(-room.before.min(8.0)), halves(room.after.min(8.0)));
+        let mut best = (0.0, 0);
+        for half in from..=to {
+            let slope = self.slope(half);
             if slope > best.0 {
-                best = (slope, distance);
+                best = (slope, half);
             }
         }
-        (best.0 > 0.01).then_some(best)
+        (best.0 > 0.01).then_some((f64::from(best.0), f64::from(best.1) / 2.0))
     }
 
-    /// Mean slope over two pixels about a distance that is a multiple of half
-    /// a pixel, of both phases \[1/px\].
-    fn slope(&self, distance: f64) -> f64 {
+    /// Mean slope over two pixels about a distance in half pixels, of both
+    /// phases \[1/px\].
+    #[inline(always)]
+    fn slope(&self, half: i16) -> f32 {
         let (mut sum, mut n) = (0.0, 0.0);
-        for phase in 0..PHASES {
-            let weight = f64::from(self.counts[phase]);
-            let k = index((distance + offset(phase, PHASES)).round()).clamp(1, SPAN - 2);
-            let rise = f64::from(self.mean[phase][k + 1] - self.mean[phase][k - 1]);
-            sum += weight * rise / 2.0;
+        let middle = i16::try_from(REACH).unwrap_or(0);
+        for (phase, mean) in (0i16..).zip(&self.mean) {
+            let weight = self.counts[usize::from(phase.unsigned_abs())];
+            // The nearest sample, of two as near the one farther out.
+            let twice = half + phase;
+            let k = (twice + twice.signum()) / 2 + middle;
+            let k = usize::try_from(k).unwrap_or(0).clamp(1, SPAN - 2);
+            sum += weight * 0.5 * (mean[k + 1] - mean[k - 1]);
             n += weight;
         }
-        sum / f64::max(n, 1.0)
+        sum / n.max(1.0)
     }
 
     /// Cuts the room off half-way to a neighbouring step: where the slope has
     /// fallen off and rises again, in either direction.
+    #[expect(clippy::cast_possible_truncation, reason = "a slope needs no more")]
+    #[inline(always)]
     fn up_to_neighbours(&self, start: Step, noise: f64, room: Extent) -> Extent {
         let noise = noise / (2.0 * self.used().max(1.0)).sqrt();
-        let notable = (5.0 * noise).max(0.06 / start.blur.max(1.0));
-        let cut = |sign: f64, room: f64| {
-            let mut lowest = (f64::INFINITY, 0.0);
-            let mut away = (0.5 * start.blur).clamp(0.5, 3.0);
-            while away < room - 1.0 {
-                let slope = self.slope(((start.at + sign * away) * 2.0).round() / 2.0).abs();
+        let notable = (5.0 * noise).max(0.06 / start.blur.max(1.0)) as f32;
+        let first = (0.5 * start.blur).clamp(0.5, 3.0);
+        let cut = |sign: i16, room: f64| {
+            let mut lowest = (f32::INFINITY, room);
+            let from = halves(start.at + f64::from(sign) * first);
+            for step in 0..halves(room - 1.0 - first) {
+                let slope = self.slope(from + sign * step).abs();
                 if slope < lowest.0 {
-                    lowest = (slope, away);
+                    lowest = (slope, first + f64::from(step) / 2.0);
                 }
                 if slope > lowest.0 + notable {
                     return lowest.1;
                 }
-                away += 0.5;
             }
             room
         };
-        Extent { before: cut(-1.0, room.before), after: cut(1.0, room.after) }
+        Extent { before: cut(-1, room.before), after: cut(1, room.after) }
     }
 
     /// Fits place, blur, levels and a little shading about the edge.
+    #[inline(always)]
     fn fit(&self, table: &StepTable, start: Look, known: Option<(f64, f64)>) -> Option<Look> {
         let mut look = start;
         // Shading is held near none, because over a short way it could pass
@@ -333,11 +351,10 @@ impl Overlay {
             if let Some((mean, sd)) = known {
                 normal.hold(1, hold(noise, sd), mean - step.blur);
             }
-            let inverse = normal.inverse()?;
-            let moved = inverse * normal.vector;
+            let solved = normal.solve()?;
+            let moved = solved.unknowns;
             // What the model leaves is noise, if not of the pixels.
             look.noise = start.pixel_noise.max(misfit.sqrt());
-            look.blur_sd = look.noise * inverse[(1, 1)].max(0.0).sqrt();
             look.step = Step {
                 at: step.at + moved[0].clamp(-step.blur, step.blur),
                 blur: (step.blur + moved[1].clamp(-0.5 * step.blur, 0.5 * step.blur))
@@ -347,7 +364,8 @@ impl Overlay {
             };
             look.shading[0] += moved[4];
             look.shading[1] += moved[5];
-            if moved[0].abs() < 2e-3 && moved[1].abs() < 2e-3 * step.blur {
+            look.blur_sd = look.noise * solved.variance(1).max(0.0).sqrt();
+            if moved[0].abs() < CONVERGED && moved[1].abs() < CONVERGED * step.blur {
                 break;
             }
         }
@@ -357,6 +375,7 @@ impl Overlay {
 
     /// Normal equations about a step, and the mean square of what it leaves,
     /// for a sample of weight 1.
+    #[inline(always)]
     fn linearise(&self, table: &StepTable, look: &Look) -> (Normal<6>, f64) {
         let Look { step: edge, room, shading, .. } = *look;
         let reach = 4.5 * edge.blur + 2.0;
@@ -385,6 +404,7 @@ impl Overlay {
 
     /// How far from the edge a side is plain, that is a straight line within
     /// what noise explains, and that line.
+    #[inline(always)]
     fn plain(
         &self,
         table: &StepTable,
@@ -430,6 +450,12 @@ fn place(index: usize) -> f64 {
 #[expect(clippy::cast_precision_loss, reason = "the window is short")]
 fn place_limit() -> f64 {
     REACH as f64 - 1.0
+}
+
+/// A distance in half pixels.
+#[expect(clippy::cast_possible_truncation, reason = "the window is short")]
+fn halves(distance: f64) -> i16 {
+    (2.0 * distance).round() as i16
 }
 
 /// Number of the sample at a whole distance, within the window.

@@ -44,7 +44,7 @@ pub fn fill(rough: impl Iterator<Item = Option<f32>>, out: &mut Vec<f32>) -> boo
 /// `memory` is scratch.
 pub fn take_out_wild(values: &mut [f32], memory: &mut Vec<f32>) {
     let count = values.len();
-    if count < WILD_WINDOW {
+    if count < WILD_WINDOW || runs_smoothly(values) {
         return;
     }
     memory.clear();
@@ -70,6 +70,12 @@ pub fn take_out_wild(values: &mut [f32], memory: &mut Vec<f32>) {
             *value = f32::NAN;
         }
     }
+}
+
+/// Whether no value lies off the line between its neighbours far enough for a
+/// wild one.
+fn runs_smoothly(values: &[f32]) -> bool {
+    values.windows(3).all(|near| (near[1] - 0.5 * (near[0] + near[2])).abs() < 0.5 * WILD_PX)
 }
 
 fn median3(values: &[f32]) -> f32 {
@@ -123,6 +129,8 @@ pub fn smooth(values: &[f32], out: &mut Vec<f32>) {
 pub struct Course {
     middles: Vec<f32>,
     values: Vec<[f32; 3]>,
+    /// Bands for each pixel along the bead.
+    per_px: f32,
 }
 
 impl Course {
@@ -132,6 +140,7 @@ impl Course {
         self.middles.extend((0..bands.count()).map(|band| narrow(bands.middle(band))));
         self.values.clear();
         self.values.extend((0..at.len()).map(|band| [at[band], before[band], step[band]]));
+        self.measure_pitch();
     }
 
     /// Moves all of it aside and takes other levels: those before and after
@@ -155,6 +164,12 @@ impl Course {
         std::mem::swap(&mut self.values, memory);
         self.middles.clear();
         self.middles.extend(lines.iter().map(|&line| narrow(middle(line))));
+        self.measure_pitch();
+    }
+
+    fn measure_pitch(&mut self) {
+        let last = self.middles.len() - 1;
+        self.per_px = float(last) / (self.middles[last] - self.middles[0]).max(1.0);
     }
 
     /// Place, level before and step at a row, or between two. Beyond the first
@@ -165,8 +180,7 @@ impl Course {
         if last == 0 {
             return self.values[0];
         }
-        let pitch = (self.middles[last] - self.middles[0]) / float(last);
-        let mut band = floor((v - self.middles[0]) / pitch).min(last - 1);
+        let mut band = floor((v - self.middles[0]) * self.per_px).min(last - 1);
         // Bands differ by a row in height.
         if v < self.middles[band] && band > 0 {
             band -= 1;

@@ -57,7 +57,7 @@ impl Bands {
         middle(self.bounds[band])
     }
 
-    /// Share of the pooled pixels at the upper end of the scale.
+    /// Share of the pixels at the upper end of the scale, from one row a band.
     #[expect(clippy::cast_precision_loss, reason = "a share needs no more")]
     pub fn saturated_share(&self) -> f64 {
         self.full as f64 / self.pixels.max(1) as f64
@@ -84,10 +84,8 @@ impl Bands {
             let row = |k| strip.row(spread(k, from, to));
             let rows = [row(0), row(1), row(2), row(3)];
             add_up(rows, self.shift, profile);
-            for row in &rows[..ROWS.min(to - from)] {
-                self.full += count_full(row, strip.white);
-                self.pixels += row.len();
-            }
+            self.full += count_full(rows[1], strip.white);
+            self.pixels += strip.across;
         }
     }
 }

@@ -99,26 +99,44 @@ fn average<T: Grey>(
 ) {
     let scale = strip.scale / float(rows.len());
     let mut sums = [T::Sum::default(); SPAN];
-    for v in rows {
-        let row = strip.row(v);
-        let within = usize::try_from(first).ok().and_then(|from| row.get(from..from + SPAN));
-        if let Some(pixels) = within.and_then(<[T]>::first_chunk) {
-            add(pixels, &mut sums);
-        } else {
-            let mut pixels = [T::default(); SPAN];
-            strip.fetch(v, first, &mut pixels);
-            add(&pixels, &mut sums);
-        }
+    let mut v = rows.start;
+    let mut memory = [[T::default(); SPAN]; 2];
+    while v + 1 < rows.end {
+        let [one, two] = &mut memory;
+        add([pixels(strip, v, first, one), pixels(strip, v + 1, first, two)], &mut sums);
+        v += 2;
+    }
+    if v < rows.end {
+        add([pixels(strip, v, first, &mut memory[0])], &mut sums);
     }
     for (out, sum) in out.iter_mut().zip(sums) {
         *out = scale * T::float(sum);
     }
 }
 
+/// The pixels of a row from a place on; `memory` is for those beyond its ends.
 #[inline(always)]
-fn add<T: Grey>(pixels: &[T; SPAN], sums: &mut [T::Sum; SPAN]) {
+fn pixels<'a, T: Grey>(
+    strip: &Strip<'a, T>,
+    v: usize,
+    first: isize,
+    memory: &'a mut [T; SPAN],
+) -> &'a [T; SPAN] {
+    let row = strip.row(v);
+    let within = usize::try_from(first).ok().and_then(|from| row.get(from..from + SPAN));
+    if let Some(pixels) = within.and_then(<[T]>::first_chunk) {
+        return pixels;
+    }
+    strip.fetch(v, first, memory);
+    memory
+}
+
+#[inline(always)]
+fn add<T: Grey, const N: usize>(rows: [&[T; SPAN]; N], sums: &mut [T::Sum; SPAN]) {
     for k in 0..SPAN {
-        sums[k] = pixels[k].add_to(sums[k]);
+        for row in rows {
+            sums[k] = row[k].add_to(sums[k]);
+        }
     }
 }
 

@@ -53,6 +53,8 @@ pub trait Grey: Copy + Default + PartialOrd {
     fn level(self) -> u32;
     /// The sum of four, without its lowest `shift` bits, which must fit 16.
     fn sum_of_four(values: [Self; 4], shift: u32) -> u16;
+    /// Distance from another value.
+    fn away_from(self, other: Self) -> u16;
     /// A sum with this value.
     fn add_to(self, sum: Self::Sum) -> Self::Sum;
     /// A sum as a float.
@@ -70,6 +72,11 @@ impl Grey for u8 {
     #[inline(always)]
     fn sum_of_four([a, b, c, d]: [Self; 4], _: u32) -> u16 {
         (u16::from(a) + u16::from(b)) + (u16::from(c) + u16::from(d))
+    }
+
+    #[inline(always)]
+    fn away_from(self, other: Self) -> u16 {
+        self.abs_diff(other).into()
     }
 
     #[inline(always)]
@@ -95,6 +102,11 @@ impl Grey for u16 {
     fn sum_of_four([a, b, c, d]: [Self; 4], shift: u32) -> u16 {
         let sum = (u32::from(a) + u32::from(b)) + (u32::from(c) + u32::from(d));
         u16::try_from(sum >> shift).unwrap_or(u16::MAX)
+    }
+
+    #[inline(always)]
+    fn away_from(self, other: Self) -> u16 {
+        self.abs_diff(other)
     }
 
     #[inline(always)]

@@ -137,6 +137,7 @@ impl Default for Template {
 
 impl Template {
     /// Tabulates an edge.
+    #[inline(always)]
     pub fn tabulate(&mut self, table: &StepTable, shape: &Shape) {
         let half = CORE_BLURS * shape.step.blur + CORE_BESIDE_PX;
         let core = chunks(2.0 * half).clamp(1, MAX_CORE);
@@ -152,10 +153,12 @@ impl Template {
             for chunk in 0..self.chunks {
                 let part = &mut self.parts[phase * MAX_CHUNKS + chunk];
                 let first = float(chunk * LANES) - float(before * LANES) - half;
-                let plain = !self.core.contains(&chunk);
-                fill(part, table, shape, first - offset(phase, PHASES), plain);
-                if !plain {
+                let first = first - offset(phase, PHASES);
+                if self.core.contains(&chunk) {
+                    fill_core(part, table, shape, first);
                     products.add(part);
+                } else {
+                    fill_plain(part, shape, first);
                 }
             }
         }
@@ -268,38 +271,75 @@ fn total(lanes: &Chunk) -> f32 {
     (four[0] + four[2]) + (four[1] + four[3])
 }
 
-/// Fills a chunk whose first pixel lies at a distance from the edge.
+/// Fills a chunk of the core whose first pixel lies at a distance from the edge.
 #[expect(clippy::cast_possible_truncation, reason = "shares and slopes of a step")]
-fn fill(part: &mut Part, table: &StepTable, shape: &Shape, first: f64, plain: bool) {
+#[inline(always)]
+fn fill_core(part: &mut Part, table: &StepTable, shape: &Shape, first: f64) {
+    let (blur, per_blur) = (shape.step.blur, 1.0 / shape.step.blur);
     for k in 0..LANES {
         let distance = first + float(k);
-        let z = distance / shape.step.blur;
-        let (step, density) = if plain { (f64::from(distance > 0.0), 0.0) } else { table.at(z) };
-        let depth_before = shape.step.blur * (density - z * (1.0 - step));
-        let depth_after = shape.step.blur * (density + z * step);
+        let z = distance * per_blur;
+        let (step, density) = table.at(z);
+        let depth_before = blur * (density - z * (1.0 - step));
+        let depth_after = blur * (density + z * step);
         let shading = shape.shading.0 * depth_before + shape.shading.1 * depth_after;
         let counts = distance >= -shape.extent.before && distance <= shape.extent.after;
         let mask = f64::from(counts);
         part.step[k] = (step + shading) as f32;
         part.mask[k] = mask as f32;
         part.after[k] = (mask * step) as f32;
-        part.slope[k] = (mask * density / shape.step.blur) as f32;
+        part.slope[k] = (mask * density * per_blur) as f32;
+    }
+}
+
+/// The same of the surroundings, on one side of the edge.
+#[expect(clippy::cast_possible_truncation, reason = "distances and slopes")]
+#[inline(always)]
+fn fill_plain(part: &mut Part, shape: &Shape, first: f64) {
+    let (first, after) = (first as f32, first > 0.0);
+    let (step, extent, shading) = if after {
+        (1.0, shape.extent.after as f32, shape.shading.1 as f32)
+    } else {
+        (0.0, shape.extent.before as f32, shape.shading.0 as f32)
+    };
+    for (k, ahead) in (0u8..).zip(&mut part.step) {
+        *ahead = first + f32::from(k);
+    }
+    for k in 0..LANES {
+        let away = part.step[k].abs();
+        part.step[k] = step + shading * away;
+        part.mask[k] = if away <= extent { 1.0 } else { 0.0 };
     }
 }
 
 impl Products {
+    #[inline(always)]
     fn add(&mut self, part: &Part) {
+        let mut lanes = [[0.0f32; LANES]; 7];
         for k in 0..LANES {
-            let [mask, after, slope] = [part.mask[k], part.after[k], part.slope[k]].map(f64::from);
+            let (mask, after, slope) = (part.mask[k], part.after[k], part.slope[k]);
             let before = mask - after;
-            self.slope_slope += slope * slope;
-            self.slope_before += slope * before;
-            self.slope_after += slope * after;
-            self.before_before += before * before;
-            self.before_after += before * after;
-            self.after_after += after * after;
-            self.pixels += mask;
+            let products = [
+                slope * slope,
+                slope * before,
+                slope * after,
+                before * before,
+                before * after,
+                after * after,
+                mask,
+            ];
+            for (lane, product) in lanes.iter_mut().zip(products) {
+                lane[k] = product;
+            }
         }
+        let sums = lanes.map(|lane| f64::from(total(&lane)));
+        self.slope_slope += sums[0];
+        self.slope_before += sums[1];
+        self.slope_after += sums[2];
+        self.before_before += sums[3];
+        self.before_after += sums[4];
+        self.after_after += sums[5];
+        self.pixels += sums[6];
     }
 
     /// Normal equations of one row for the step times its shift, the level

@@ -225,18 +225,22 @@ impl Tracer {
 
     /// Levels on either side of the edge in every band, as the median of a few
     /// places in its profile and of its neighbours.
+    #[inline(always)]
     fn pick_levels<T: Grey>(&mut self, scene: &Scene<'_, T>) {
         self.before.clear();
         self.step.clear();
         let inside = 0.45 * scene.width_px;
         let (room_before, room_after) =
             if scene.bead_after { (f32::INFINITY, inside) } else { (inside, f32::INFINITY) };
+        let (left, right) = (picked(-1.0, room_before), picked(1.0, room_after));
+        let unit = scene.bands.unit();
         for (band, &at) in self.path.iter().enumerate() {
             let profile = scene.bands.profile(band);
-            let unit = scene.bands.unit();
-            let before = unit * level(profile, at, -1.0, room_before);
+            #[expect(clippy::cast_possible_truncation, reason = "a place in the gauge")]
+            let at = (at + 0.5) as isize;
+            let before = unit * level(profile, at, left);
             self.before.push(before);
-            self.step.push(unit * level(profile, at, 1.0, room_after) - before);
+            self.step.push(unit * level(profile, at, right) - before);
         }
         path::median_of_three(&mut self.before);
         path::median_of_three(&mut self.step);
@@ -334,6 +338,7 @@ impl Tracer {
 
     /// Sums up the rows of each band, without those on which a grain or a
     /// spark lies.
+    #[inline(always)]
     fn gather<T: Grey>(&mut self, scene: &Scene<'_, T>) {
         let products = self.template.products;
         let stiffness = narrow(products.slope_slope);
@@ -382,6 +387,7 @@ impl Tracer {
         }
     }
 
+    #[inline(always)]
     fn gather_band<T: Grey>(
         &mut self,
         scene: &Scene<'_, T>,
@@ -420,6 +426,7 @@ impl Tracer {
     }
 
     /// Solves every band; returns whether the path was near enough for that.
+    #[inline(always)]
     fn locate<T: Grey>(&mut self, scene: &Scene<'_, T>, blur: f64) -> bool {
         let variance = f64::from(scene.noise).powi(2);
         let core = self.template.products.matrix();
@@ -451,6 +458,7 @@ impl Tracer {
     /// How much the level at the edge differs from that of the surroundings
     /// from band to band beyond what noise explains: texture does that, and
     /// then the surroundings say less. Robust, from the median.
+    #[inline(always)]
     fn extra_variance(&mut self, core: Matrix3<f64>, variance: f64, side: usize) -> f64 {
         let Some(inverse) = core.try_inverse() else { return 0.0 };
         self.scatter.clear();
@@ -491,6 +499,7 @@ impl BandSums {
 
     /// Place relative to the path and what is known of it; `None` without a
     /// row or an edge.
+    #[inline(always)]
     fn solve(
         &self,
         core: Matrix3<f64>,
@@ -510,31 +519,51 @@ impl BandSums {
                 vector[side + 1] += weight * sum / count;
             }
         }
-        let inverse = matrix.try_inverse()?;
-        let found = inverse * vector;
+        let (found, variance_of_place) = solve(&matrix, &vector)?;
         let height = self.step + found[2] - found[1];
-        let variance = variance * inverse[(0, 0)] / (self.step * self.step);
+        let variance = variance * variance_of_place / (self.step * self.step);
         let share = self.rows / self.all_rows;
         Some((found[0] / self.step, Located { at: 0.0, variance, height, share }))
     }
 }
 
-/// Level at some distance from an edge: the median of five places.
-fn level(profile: &[u16], at: f32, sign: f32, room: f32) -> f32 {
-    let near = PICK.0.min(0.4 * room);
-    let apart = PICK.1.min((room - near) / 5.0);
-    let at_place = |k: f32| {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "saturates at 0 and is clamped to the profile"
-        )]
-        let place = (at + sign * (near + k * apart) + 0.5) as usize;
-        f32::from(profile[place.min(profile.len() - 1)])
-    };
-    median_of_five([at_place(0.0), at_place(1.0), at_place(2.0), at_place(3.0), at_place(4.0)])
+/// Solves symmetric equations for place and levels, the levels first; the
+/// variance is that of the place.
+fn solve(matrix: &Matrix3<f64>, vector: &Vector3<f64>) -> Option<([f64; 3], f64)> {
+    let (a, b, c) = (matrix[(1, 1)], matrix[(2, 1)], matrix[(2, 2)]);
+    let determinant = a * c - b * b;
+    let (p, q) = (matrix[(1, 0)], matrix[(2, 0)]);
+    // What a shift by 1 does to the levels, times the determinant.
+    let (before, after) = (c * p - b * q, a * q - b * p);
+    let stiffness = matrix[(0, 0)] * determinant - (p * before + q * after);
+    if determinant <= 0.0 || stiffness <= 0.0 {
+        return None;
+    }
+    let place = (vector[0] * determinant - vector[1] * before - vector[2] * after) / stiffness;
+    let (x, y) = (vector[1] - p * place, vector[2] - q * place);
+    let levels = [(c * x - b * y) / determinant, (a * y - b * x) / determinant];
+    Some(([place, levels[0], levels[1]], determinant / stiffness))
 }
 
+/// Distances from an edge at which its level on one side is picked \[px\].
+#[expect(clippy::cast_possible_truncation, reason = "a few pixels")]
+fn picked(sign: f32, room: f32) -> [isize; 5] {
+    let near = PICK.0.min(0.4 * room);
+    let apart = PICK.1.min((room - near) / 5.0);
+    [0.0, 1.0, 2.0, 3.0, 4.0].map(|k| (sign * (near + k * apart)).round() as isize)
+}
+
+/// Level at such distances from an edge: the median of five places.
+#[inline(always)]
+fn level(profile: &[u16], at: isize, distances: [isize; 5]) -> f32 {
+    let last = profile.len() - 1;
+    median_of_five(distances.map(|distance| {
+        let place = usize::try_from(at + distance).unwrap_or(0).min(last);
+        f32::from(profile[place])
+    }))
+}
+
+#[inline(always)]
 fn median_of_five(values: [f32; 5]) -> f32 {
     let [first, second, third, fourth, last] = values;
     let low = first.min(second).max(third.min(fourth));
