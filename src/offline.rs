@@ -6,6 +6,7 @@
 //! under its final name only when it is whole.
 
 pub mod accuracy;
+pub mod edges;
 pub mod log;
 pub mod names;
 pub mod output;
@@ -22,6 +23,7 @@ pub mod summary;
 mod synthetic;
 pub mod widths;
 
+pub use edges::EdgesWriter;
 pub use log::{ControlFacts, LogOptions, RunLog};
 pub use output::LogError;
 pub use progress::Progress;

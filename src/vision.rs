@@ -58,4 +58,4 @@ pub mod width;
 pub use gauge::{Axis, Gauge, Method, Polarity};
 pub use measure::Measurer;
 pub use reject::Reject;
-pub use width::{Edges, Hints, WidthMeasurement};
+pub use width::{Caliper, EdgePlace, Edges, Hints, WidthMeasurement};

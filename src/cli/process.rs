@@ -14,7 +14,7 @@ use crate::config::cell::Purpose;
 use crate::io::camera::mcap::RobotZ;
 use crate::io::camera::open::{self, OfflineOptions};
 use crate::io::stop::StopSignal;
-use crate::offline::{FrameRow, LogOptions, Note, Progress, RunLog, Summary};
+use crate::offline::{EdgesWriter, FrameRow, LogOptions, Note, Progress, RunLog, Summary};
 use crate::ports::{FrameSource, Grab, SourceError};
 use crate::vision::{Measurer, Reject};
 
@@ -30,9 +30,10 @@ Examples:
   truebead process frames/ --cell cell.toml --out measured/
   truebead process clip.mp4 --cell cell.toml --out measured/
   truebead process recording.mcap --cell cell.toml --out measured/
+  truebead process clip.mp4 --cell cell.toml --out measured/ --edges
 
-Leaves widths.csv, summary.json and report.html in the output folder. The cell
-needs [calibration] and [gauge] only.")]
+Leaves widths.csv, summary.json and report.html in the output folder, with
+--edges also edges.csv. The cell needs [calibration] and [gauge] only.")]
 pub struct ProcessArgs {
     /// Folder of images, video file or MCAP
     input: PathBuf,
@@ -48,6 +49,9 @@ pub struct ProcessArgs {
     /// Topic of the frames in an MCAP [default: the first with images]
     #[arg(long, value_name = "TOPIC")]
     topic: Option<String>,
+    /// Also write edges.csv: where each caliper line found the two edges
+    #[arg(long)]
+    edges: bool,
 }
 
 /// Runs the command; the summary goes to standard output.
@@ -75,7 +79,8 @@ pub fn run(args: &ProcessArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     })?;
     let total = recorded.source.expected_frames();
     let progress = Progress::new("measuring", "frames", total, voice.quiet);
-    let bench = Bench { loaded: &loaded, robot_z: recorded.robot_z.as_ref(), progress, log };
+    let edges = args.edges.then(|| EdgesWriter::create(&args.out)).transpose()?;
+    let bench = Bench { loaded: &loaded, robot_z: recorded.robot_z.as_ref(), progress, log, edges };
     let summary = bench.measure_all(recorded.source, &stop)?;
     Ok(conclude(args, &summary, &loaded))
 }
@@ -90,6 +95,7 @@ struct Bench<'a> {
     robot_z: Option<&'a RobotZ>,
     progress: Progress,
     log: RunLog,
+    edges: Option<EdgesWriter>,
 }
 
 impl Bench<'_> {
@@ -130,7 +136,11 @@ impl Bench<'_> {
             self.log.note(&Note::Remark(error.to_string()));
         }
         self.progress.finish();
-        Ok(self.log.finish()?)
+        let summary = self.log.finish()?;
+        if let Some(edges) = self.edges {
+            edges.finish()?;
+        }
+        Ok(summary)
     }
 
     fn measure(
@@ -147,6 +157,9 @@ impl Bench<'_> {
                     .map_err(|reject| reject.status());
                 let row = FrameRow { frame: frame.seq, time_s, outcome, control: None };
                 self.log.frame(&row, Some(&frame), Some(measurer.edges()))?;
+                if let Some(edges) = &mut self.edges {
+                    edges.frame(frame.seq, measurer.calipers())?;
+                }
             }
             Grab::Unreadable { seq, time_s, reason } => {
                 if unreadable <= NAMED {

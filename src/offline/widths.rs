@@ -158,7 +158,7 @@ fn control_fields(control: Option<&ControlColumns>) -> [String; 6] {
 }
 
 /// A number with fixed decimals; empty where it is unknown or not finite.
-fn decimals(value: Option<f64>, places: usize) -> String {
+pub fn decimals(value: Option<f64>, places: usize) -> String {
     let Some(value) = value.filter(|value| value.is_finite()) else { return String::new() };
     let text = format!("{value:.places$}");
     match text.strip_prefix('-') {

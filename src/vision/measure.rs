@@ -18,7 +18,7 @@ use super::reject::Reject;
 use super::step::StepTable;
 use super::strip::{Grey, Strip, Strips, Turner, View};
 use super::trace::{Scene, Tracer};
-use super::width::{Edges, Hints, WidthMeasurement};
+use super::width::{Caliper, EdgePlace, Edges, Hints, WidthMeasurement};
 
 /// Share of the caliper lines that must show each of the two edges.
 const NEED_SHARE: f64 = 0.6;
@@ -119,6 +119,37 @@ impl Measurer {
     /// The edges behind the last width, for pictures of them.
     pub fn edges(&self) -> Edges<'_> {
         Edges { left: &self.work.left_px, right: &self.work.right_px }
+    }
+
+    /// The same line by line, with how sure each place is. A refused frame has
+    /// the edges that were found before it was refused.
+    pub fn calipers(&self) -> impl Iterator<Item = Caliper> {
+        let Edges { left, right } = self.edges();
+        let (mut left, mut right) = (left.iter().copied(), right.iter().copied());
+        let lines = match self.gauge.method {
+            Method::Caliper => self.work.lines.len(),
+            Method::EdgeLines => left.len(),
+        };
+        (0..lines).filter_map(move |number| {
+            let left = self.place(&self.work.left, number, &mut left);
+            let right = self.place(&self.work.right, number, &mut right);
+            let found = left.is_some() || right.is_some();
+            found.then_some(Caliper { number, left, right })
+        })
+    }
+
+    /// The next point of an edge, if it belongs to this line.
+    fn place(
+        &self,
+        tracer: &Tracer,
+        number: usize,
+        points: &mut impl Iterator<Item = ImagePoint>,
+    ) -> Option<EdgePlace> {
+        if self.gauge.method == Method::EdgeLines {
+            return Some(EdgePlace { at: points.next()?, sigma_px: None });
+        }
+        let located = tracer.edges().get(number).copied().flatten()?;
+        Some(EdgePlace { at: points.next()?, sigma_px: Some(located.variance.sqrt()) })
     }
 
     /// Measures the bead in a frame on a surface.

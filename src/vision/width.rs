@@ -49,3 +49,24 @@ pub struct Edges<'a> {
     /// The right (of a horizontal bead the lower) edge.
     pub right: &'a [ImagePoint],
 }
+
+/// A caliper line with the edges that were found on it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Caliper {
+    /// Number of the line along the gauge, from 0.
+    pub number: usize,
+    /// The left (of a horizontal bead the upper) edge.
+    pub left: Option<EdgePlace>,
+    /// The right (of a horizontal bead the lower) edge.
+    pub right: Option<EdgePlace>,
+}
+
+/// Where an edge was found on one caliper line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgePlace {
+    /// In raw image pixels.
+    pub at: ImagePoint,
+    /// Standard deviation across the bead \[px\], as the pixels' noise explains
+    /// it; none where the method knows none.
+    pub sigma_px: Option<f64>,
+}
