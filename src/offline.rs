@@ -17,6 +17,7 @@ pub mod replay;
 pub mod report;
 pub mod reproduce;
 pub mod row;
+pub mod setup;
 pub mod stats;
 pub mod summary;
 #[cfg(test)]

@@ -41,6 +41,9 @@ pub fn figures(summary: &Summary) {
     if let (Some(mean), Some(std)) = (summary.width_mean_mm, summary.width_std_mm) {
         println!("width      {mean:.3} mm on average, standard deviation {std:.3} mm");
     }
+    for sentence in &summary.advice {
+        println!("hint       {sentence}");
+    }
     let Some(control) = &summary.control else { return };
     if let Some(target) = summary.target_width_mm {
         println!("target     {target} mm");

@@ -200,6 +200,9 @@ fn conclude(args: &ProcessArgs, summary: &Summary, loaded: &LoadedCell) -> ExitC
     if let (Some(mean), Some(std)) = (summary.width_mean_mm, summary.width_std_mm) {
         println!("width {mean:.3} mm on average, standard deviation {std:.3} mm");
     }
+    for sentence in &summary.advice {
+        println!("hint: {sentence}");
+    }
     println!("{}", args.out.join("report.html").display());
     let share = summary.rejected_share();
     let most = loaded.cell.recording.max_rejected_share;

@@ -14,6 +14,7 @@ pub use follow::Follower;
 
 use super::output::{LogError, write_whole};
 use super::row::FrameRow;
+use super::setup;
 use super::stats::{Distribution, Moments, as_f64};
 use crate::control::{Event, Step};
 use crate::time::Stamp;
@@ -42,6 +43,8 @@ pub struct Summary {
     pub roughness_mean_mm: Option<f64>,
     /// How good the pictures were.
     pub hints: HintSummary,
+    /// What could be better about light and lens, in words.
+    pub advice: Vec<String>,
     /// From the first moment that is known to the last.
     pub duration_s: Option<f64>,
     /// Width that was asked for.
@@ -206,6 +209,7 @@ impl SummaryBuilder {
     /// The sum of it all.
     pub fn finish(&self) -> Summary {
         let measured = self.frames - self.rejected.values().sum::<u64>();
+        let hints = self.hints();
         Summary {
             frames: self.frames,
             measured,
@@ -215,16 +219,21 @@ impl SummaryBuilder {
             width_std_mm: self.width.std(),
             sigma_mean_mm: self.sigma.mean(),
             roughness_mean_mm: self.roughness.mean(),
-            hints: HintSummary {
-                contrast_median_grey: self.contrast.quantile(0.5),
-                blur_median_px: self.blur.quantile(0.5),
-                noise_median_grey: self.noise.quantile(0.5),
-                saturated_share_mean: self.saturated.mean(),
-                used_share_mean: self.used.mean(),
-            },
+            advice: setup::advice(&hints),
+            hints,
             duration_s: self.first_s.zip(self.last_s).map(|(first, last)| last - first),
             target_width_mm: self.target.map(Mm::get),
             control: self.control.as_ref().map(ControlTally::finish),
+        }
+    }
+
+    fn hints(&self) -> HintSummary {
+        HintSummary {
+            contrast_median_grey: self.contrast.quantile(0.5),
+            blur_median_px: self.blur.quantile(0.5),
+            noise_median_grey: self.noise.quantile(0.5),
+            saturated_share_mean: self.saturated.mean(),
+            used_share_mean: self.used.mean(),
         }
     }
 

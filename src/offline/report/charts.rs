@@ -54,6 +54,10 @@ pub struct Charts {
     pub noise: Series,
     /// Share of saturated pixels \[%\].
     pub saturated: Series,
+    /// Share of the rows that the width comes from \[%\].
+    pub used: Series,
+    /// Standard deviation of the width \[mm\].
+    pub sigma: Series,
     /// Refused frames.
     pub refused: Strip,
     /// States of the controller.
@@ -83,6 +87,8 @@ impl Charts {
         self.blur.push(x, measured.hints.blur_px);
         self.noise.push(x, measured.hints.noise_grey);
         self.saturated.push(x, measured.hints.saturated_share * 100.0);
+        self.used.push(x, measured.hints.used_share * 100.0);
+        self.sigma.push(x, sigma);
     }
 
     /// A step of the controller.

@@ -12,7 +12,9 @@ use super::series::Series;
 use super::strip::Strip;
 use super::strips::{self, Row};
 use super::{advice, histogram};
+use crate::offline::setup;
 use crate::offline::stats::as_f64;
+use crate::offline::summary::Summary;
 
 /// Width, speed, states and limits over time, or over frames.
 pub fn over_time(report: &Report<'_>) -> Markup {
@@ -183,13 +185,14 @@ pub fn hints(report: &Report<'_>) -> Markup {
     let charts = report.charts;
     let Some(range) = charts.contrast.extent() else { return html! {} };
     let axis = if charts.timed == Some(true) { XAxis::time(range) } else { XAxis::frames(range) };
-    let small = |series: &Series, y_title: &str| {
+    // A steady hint is drawn as steady, not as its last digits.
+    let small = |series: &Series, least_top: f64, y_title: &str| {
         let (low, high) = y_range(&[series], &[0.0]);
         Plot {
             area: Area::half(190.0),
             x: &axis,
             y_title,
-            y_range: (low.max(0.0), high.max(0.1)),
+            y_range: (low.max(0.0), high.max(least_top)),
             layers: vec![Layer::Curve(series, palette::WIDTH)],
         }
         .draw()
@@ -197,14 +200,34 @@ pub fn hints(report: &Report<'_>) -> Markup {
     html! {
         section {
             h2 { "How good the pictures are" }
+            (improvements(report.summary))
             p.hint { "Much contrast, little blur and noise and no saturation make a sure width. A \
                 slow drift tells of dust on the lens or of changing light." }
             div.pair {
-                (small(&charts.contrast, "contrast [grey levels of 256]"))
-                (small(&charts.blur, "blur of the edges [px]"))
-                (small(&charts.noise, "noise of a pixel [grey levels of 256]"))
-                (small(&charts.saturated, "saturated pixels in the gauge [%]"))
+                (small(&charts.contrast, 10.0, "contrast [grey levels of 256]"))
+                (small(&charts.blur, 0.1, "blur of the edges [px]"))
+                (small(&charts.noise, 0.1, "noise of a pixel [grey levels of 256]"))
+                (small(&charts.saturated, 0.1, "saturated pixels in the gauge [%]"))
+                (small(&charts.used, 100.0, "rows that the width comes from [%]"))
+                (small(&charts.sigma, 0.001, "standard deviation of the width [mm]"))
             }
+        }
+    }
+}
+
+/// What could be better about light and lens.
+fn improvements(summary: &Summary) -> Markup {
+    let bound = setup::row_bound_px(&summary.hints);
+    html! {
+        @if !summary.advice.is_empty() {
+            ul.advice { @for sentence in &summary.advice { li { (sentence) } } }
+        } @else if bound.is_some() {
+            p { "There is nothing to improve about light and lens." }
+        }
+        @if let Some(bound) = bound {
+            p.hint { "In such pictures no method can place an edge in one row with a standard \
+                deviation below " (format!("{bound:.3}")) " px; a hundred rows make that ten times \
+                less." }
         }
     }
 }

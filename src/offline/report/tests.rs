@@ -75,3 +75,40 @@ fn hours_make_a_page_no_larger_than_minutes() {
     assert!(page.len() < 1_500_000, "{}", page.len());
     assert!(page.contains("time [h]") && page.contains("along the path [m]"));
 }
+
+#[test]
+fn the_page_says_what_to_improve_about_light_and_lens() {
+    let (_, page) = page_of("light", |folder| {
+        let options = synthetic::options(folder, "Blurred", false);
+        let mut log = crate::offline::RunLog::create(options).unwrap();
+        let mut measured = crate::offline::row::sample::measured(42.0, 0.02);
+        measured.hints.blur_px = 4.1;
+        for frame in 0..20 {
+            let outcome = Ok(measured);
+            let row = crate::offline::FrameRow { frame, time_s: None, outcome, control: None };
+            log.frame(&row, None, None).unwrap();
+        }
+        log.finish().unwrap()
+    });
+    let text = text_of(&page);
+    assert!(text.contains("Blur 4.1 px: refocus"), "the advice");
+    assert!(text.contains("rows that the width comes from [%]"), "the plot");
+    let (_, page) = page_of("unadvised", synthetic::process);
+    assert!(text_of(&page).contains("nothing to improve") != page.contains("class=\"advice\""));
+}
+
+#[test]
+fn curves_keep_to_the_grid_that_they_are_drawn_on() {
+    // A style's width and height win over those of an svg within another, which
+    // would be stretched then, and its curves lie beside their axes.
+    let (_, page) = page_of("stretched", synthetic::run);
+    let style = page.split_once("</style>").unwrap().0;
+    for rule in style.split('}') {
+        let Some((selector, properties)) = rule.split_once('{') else { continue };
+        let every_svg = selector.trim().trim_end_matches("*/").ends_with("svg");
+        assert!(!every_svg || !properties.contains("width"), "{rule}");
+    }
+    let outer = page.matches("<svg viewBox").count();
+    assert_eq!(outer, page.matches("role=\"img\"").count());
+    assert!(page.contains("svg[role=\"img\"] {"));
+}

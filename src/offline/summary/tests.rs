@@ -165,3 +165,18 @@ fn counts_reach_the_file_under_their_promised_keys() {
     assert_eq!(json["width_error_rms_settled_mm"], serde_json::Value::Null);
     assert_eq!(json["width_mean_mm"], serde_json::Value::Null);
 }
+
+#[test]
+fn light_that_is_too_strong_is_answered_with_advice() {
+    let mut builder = SummaryBuilder::new(None, false);
+    let mut measured = sample::measured(42.0, 0.1);
+    builder.frame(&FrameRow { frame: 0, time_s: None, outcome: Ok(measured), control: None });
+    assert!(builder.finish().advice.is_empty());
+    measured.hints.saturated_share = 0.25;
+    for frame in 1..9 {
+        builder.frame(&FrameRow { frame, time_s: None, outcome: Ok(measured), control: None });
+    }
+    let json = serde_json::to_value(builder.finish()).unwrap();
+    let advice = json["advice"][0].as_str().unwrap();
+    assert!(advice.contains("22 %") && advice.contains("shorten the exposure"), "{advice}");
+}
