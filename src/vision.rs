@@ -27,6 +27,7 @@
     reason = "a loop takes part in the choice of vectors only where it is inlined into it"
 )]
 
+mod agree;
 mod axis;
 mod blur;
 mod contour;

@@ -26,6 +26,8 @@ const NEED_SHARE: f64 = 0.6;
 const LEAST_SHARE: f64 = 0.4;
 /// Share of the rows from which each edge must come.
 const NEED_ROWS: f64 = 0.4;
+/// The same where each row is known to be clear.
+const NEED_CLEAR_ROWS: f64 = 0.1;
 /// Share of saturated pixels from which missing contrast is laid to light.
 const MUCH_LIGHT: f64 = 0.3;
 /// Share of the brighter side's pixels that may be saturated: noise about the
@@ -355,7 +357,9 @@ impl Work {
             ));
         }
         let got = self.left.used_share().min(self.right.used_share());
-        if got < NEED_ROWS || worst > MAX_SCATTER_PX {
+        let enough =
+            [&self.left, &self.right].iter().all(|side| side.used_share() >= need_of(side));
+        if !enough || worst > MAX_SCATTER_PX {
             let got = if worst > MAX_SCATTER_PX { 0.0 } else { got };
             return Err(Reject::NoPair { got, need: NEED_ROWS });
         }
@@ -407,6 +411,11 @@ impl Work {
         let (gauge, middles) = (&self.gauge, self.middles.as_slice());
         axis::width(&axis::Scene { view, surface, gauge, middles, sides }, hints, &mut self.axis)
     }
+}
+
+/// Share of the rows from which an edge must come.
+fn need_of(side: &Tracer) -> f64 {
+    if side.covered { NEED_CLEAR_ROWS } else { NEED_ROWS }
 }
 
 /// Blur that both edges have, seen through one lens, and how far one may differ

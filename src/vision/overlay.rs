@@ -24,6 +24,10 @@ const JUDGED: Range<usize> = REACH - CORE..REACH + CORE;
 /// A row that differs from the mean by so many times what rows do in the
 /// median is left out; the second time, when the mean is a better one.
 const UNLIKE: [f32; 2] = [2.0, 1.7];
+/// Share of the rows that are most alike, from which a mean is made where many
+/// may be covered, and how often anew.
+const ALIKE: f32 = 0.3;
+const SETTLES: usize = 5;
 /// Blur that the place's rounding to half a pixel adds \[px²\].
 const ROUNDING: f64 = 1.0 / 48.0;
 
@@ -102,6 +106,7 @@ pub struct Shape {
 /// its pixel \[px\], and of how many rows it is.
 #[derive(Debug, Clone, Copy)]
 struct Laid {
+    number: usize,
     phase: usize,
     ahead: f32,
     rows: f32,
@@ -138,6 +143,39 @@ impl Overlay {
     /// Lays down the windows along a path.
     #[inline(always)]
     pub fn lay(&mut self, sheet: &Sheet, path: &impl Path) {
+        self.lay_down(sheet, path);
+        self.average(f32::INFINITY, JUDGED);
+        let [first, last] = UNLIKE;
+        let limit = first * self.judge(0.5);
+        self.average(limit, JUDGED);
+        let limit = last * self.judge(0.5);
+        self.average(limit, 0..SPAN);
+    }
+
+    /// Lays down windows along a path of which many may be covered: starts from
+    /// those that are said to be clear and goes on with those that are most
+    /// like the mean, over and over.
+    #[inline(always)]
+    pub fn settle(&mut self, sheet: &Sheet, path: &impl Path, clear: impl Fn(usize) -> bool) {
+        self.lay_clear(sheet, path, clear);
+        for _ in 0..SETTLES {
+            let limit = self.judge(ALIKE);
+            self.average(limit, 0..SPAN);
+        }
+    }
+
+    /// Lays down the windows along a path that are clear, and no others.
+    #[inline(always)]
+    pub fn lay_clear(&mut self, sheet: &Sheet, path: &impl Path, clear: impl Fn(usize) -> bool) {
+        self.lay_down(sheet, path);
+        for (laid, unlike) in self.phases.iter().zip(&mut self.unlike) {
+            *unlike = if clear(laid.number) { 0.0 } else { f32::INFINITY };
+        }
+        self.average(f32::MAX, 0..SPAN);
+    }
+
+    #[inline(always)]
+    fn lay_down(&mut self, sheet: &Sheet, path: &impl Path) {
         let windows = sheet.windows();
         let count = windows.len().min(ROWS);
         self.rows.clear();
@@ -160,16 +198,10 @@ impl Overlay {
                 *sample = pixel * scale - shift;
             }
             self.rows.push(row);
-            self.phases.push(Laid { phase, ahead, rows: window.rows });
+            self.phases.push(Laid { number, phase, ahead, rows: window.rows });
         }
         self.unlike.clear();
         self.unlike.resize(self.rows.len(), 0.0);
-        self.average(f32::INFINITY, JUDGED);
-        let [first, last] = UNLIKE;
-        let limit = first * self.judge();
-        self.average(limit, JUDGED);
-        let limit = last * self.judge();
-        self.average(limit, 0..SPAN);
     }
 
     /// Means of the rows that are not unlike the others, in some columns.
@@ -182,7 +214,7 @@ impl Overlay {
             if unlike > limit {
                 continue;
             }
-            let Laid { phase, ahead, rows } = *laid;
+            let Laid { phase, ahead, rows, .. } = *laid;
             self.counts[phase] += rows;
             self.shifts[phase] += rows * ahead;
             let sums = self.mean[phase][columns.clone()].iter_mut();
@@ -199,9 +231,10 @@ impl Overlay {
         }
     }
 
-    /// How far each row lies from the mean about the edge; returns the median.
+    /// How far each row lies from the mean about the edge; returns how far a
+    /// share of them does at most.
     #[inline(always)]
-    fn judge(&mut self) -> f32 {
+    fn judge(&mut self, share: f32) -> f32 {
         for ((row, laid), unlike) in self.rows.iter().zip(&self.phases).zip(&mut self.unlike) {
             let mean = &self.mean[laid.phase];
             let mut lanes = [0.0f32; 8];
@@ -215,11 +248,11 @@ impl Overlay {
         }
         self.sorted.clear();
         self.sorted.extend_from_slice(&self.unlike);
-        let middle = self.sorted.len() / 2;
         if self.sorted.is_empty() {
             return f32::INFINITY;
         }
-        *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1
+        let rank = rank_of(self.sorted.len(), share);
+        *self.sorted.select_nth_unstable_by(rank, f32::total_cmp).1
     }
 
     /// Rows that the means are of.
@@ -440,6 +473,17 @@ impl Overlay {
         }
         (end, line)
     }
+}
+
+/// Number of the value that a share of all do not exceed.
+#[expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a share of a small number"
+)]
+fn rank_of(count: usize, share: f32) -> usize {
+    ((share * count as f32) as usize).min(count - 1)
 }
 
 #[expect(clippy::cast_precision_loss, reason = "the window is short")]

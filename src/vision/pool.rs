@@ -52,6 +52,12 @@ impl Bands {
         self.bounds[band]
     }
 
+    /// The band of a row.
+    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+    pub fn band_of(&self, row: f32) -> usize {
+        self.bounds.partition_point(|&(_, end)| end as f32 <= row).min(self.count() - 1)
+    }
+
     /// Middle of a band along the bead \[px\].
     pub fn middle(&self, band: usize) -> f64 {
         middle(self.bounds[band])

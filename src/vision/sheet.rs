@@ -8,10 +8,9 @@ pub const SPAN: usize = 112;
 /// Pixel of a window at which the edge is expected.
 pub const MIDDLE: usize = SPAN / 2;
 
-/// Rows of a gauge from which on those of a caliper line are taken together, as
-/// many at most, and how far an edge may run aside within them \[px\].
+/// Rows of a gauge from which on those of a caliper line are taken together, and
+/// how far an edge may run aside within them \[px\].
 const PLENTY: usize = 160;
-const MOST_TOGETHER: usize = 8;
 const STRAIGHT_PX: f32 = 0.6;
 
 /// A window: the mean of a few neighbouring rows \[grey levels of 256\].
@@ -49,16 +48,16 @@ impl Sheet {
     /// Reads the windows about an edge that runs through `at`, a place across
     /// the bead for one along it, and nowhere runs aside more than `steepest`.
     /// Rows are taken together within caliper lines: one where there are few,
-    /// more where a tall gauge has plenty.
+    /// more, but no more than `most`, where a tall gauge has plenty.
     #[inline(always)]
     pub fn read<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
         lines: &[(usize, usize)],
-        steepest: f32,
+        (steepest, most): (f32, usize),
         at: impl Fn(f32) -> f32,
     ) {
-        let together = rows_together(strip.along, lines.len(), steepest);
+        let together = rows_together(strip.along, lines.len(), steepest).min(most);
         self.windows.clear();
         for (line, &(from, to)) in lines.iter().enumerate() {
             let mut v = from;
@@ -86,7 +85,7 @@ fn rows_together(along: usize, lines: usize, steepest: f32) -> usize {
         return 1;
     }
     let straight = count(STRAIGHT_PX / steepest.max(1e-3));
-    along.div_ceil(lines.max(1)).min(straight).clamp(1, MOST_TOGETHER)
+    along.div_ceil(lines.max(1)).min(straight).max(1)
 }
 
 /// Mean of some rows from a place on.

@@ -136,6 +136,12 @@ impl Default for Template {
 }
 
 impl Template {
+    /// How far the core reaches to either side for a blur \[px\].
+    pub fn core_half(blur: f64) -> f64 {
+        let half = CORE_BLURS * blur + CORE_BESIDE_PX;
+        float(chunks(2.0 * half).clamp(1, MAX_CORE) * LANES / 2)
+    }
+
     /// Tabulates an edge.
     #[inline(always)]
     pub fn tabulate(&mut self, table: &StepTable, shape: &Shape) {

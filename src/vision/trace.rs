@@ -3,6 +3,8 @@
 //! held against it, and the rows of a band are solved for place and levels
 //! together.
 
+mod uncover;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::overlay::{Extent, Look, Overlay, REACH, Shape, Step};
@@ -27,6 +29,8 @@ const MANY_SIGMA: f32 = 4.5;
 const UNLIKE: f32 = 2.5;
 /// Rows of a band may differ by this much beside their noise \[px\].
 const WAVY_PX: f32 = 0.5;
+/// Rows that are taken together at most.
+const MOST_TOGETHER: usize = 8;
 /// Wild pixels that a row may have; more are a grain.
 const FEW_WILD: f32 = 2.0;
 /// Share of the plain pixels that must be as they are expected for their level
@@ -34,6 +38,12 @@ const FEW_WILD: f32 = 2.0;
 const LEAST_PLAIN: f64 = 0.6;
 /// Share of its rows that a band must have left to count.
 const LEAST_SHARE: f64 = 0.5;
+/// The same where rows are known to be clear, one by one.
+const LEAST_CLEAR_SHARE: f64 = 0.2;
+/// Share of the rows from which on an edge is taken to be covered in part, and
+/// by how much the squares that they leave exceed what may be noise.
+const COVERED_SHARE: f64 = 0.03;
+const UNFIT: f32 = 1.5;
 /// Where levels are picked first: distance from the edge, and apart \[px\].
 const PICK: (f32, f32) = (5.0, 3.0);
 /// Extra deviation of levels that is believed, in standard deviations of its
@@ -73,6 +83,7 @@ pub struct Scene<'a, T> {
 /// Traces one edge of the bead; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct Tracer {
+    picked: Vec<f32>,
     rough: Vec<f32>,
     path: Vec<f32>,
     before: Vec<f32>,
@@ -90,6 +101,21 @@ pub struct Tracer {
     scatter: Vec<f64>,
     edges: Vec<Option<Located>>,
     refiner: Refiner,
+    /// Rough places that are free to agree, and those of the best course yet.
+    free: Vec<f32>,
+    best_free: Vec<f32>,
+    /// Bands that agree with most of the others.
+    trusted: Vec<bool>,
+    /// Groups that show the edge and nothing else; none where that is not
+    /// asked.
+    clear: Vec<bool>,
+    /// Whether rows are sorted by that, each for itself.
+    sort_rows: bool,
+    /// Share of the rows that did not fit.
+    unfit: f64,
+    /// Whether the edge was found to be covered in part, and is located from
+    /// its clear rows alone.
+    pub covered: bool,
     /// What a row in the median leaves of the step that it is held against, in
     /// standard deviations of its noise; about 1 where the edge is one.
     pub misfit: f64,
@@ -109,7 +135,10 @@ struct Group {
     /// How far the rows were sampled beyond the path \[px\].
     ahead: f32,
     sums: RowSums,
-    /// Sum of the squares of what does not fit \[grey levels²\].
+    /// Place of the edge beside the path \[px\].
+    moved: f32,
+    /// Sum of the squares of what does not fit, as if of a single row
+    /// \[grey levels²\].
     misfit: f32,
 }
 
@@ -118,6 +147,7 @@ struct Group {
 struct BandSums {
     rows: f64,
     all_rows: f64,
+    held_rows: f64,
     step: f64,
     vector: [f64; 3],
     before: (f64, f64),
@@ -153,6 +183,12 @@ impl Tracer {
         self.edges.clear();
         self.seen = None;
         self.path.clear();
+        self.covered = false;
+        self.sort_rows = false;
+        self.clear.clear();
+        self.picked.clear();
+        self.picked.extend(rough.map(|at| at.unwrap_or(f32::NAN)));
+        let rough = self.picked.iter().map(|at| at.is_finite().then_some(*at));
         if !path::fill(rough, &mut self.rough) {
             return None;
         }
@@ -182,6 +218,26 @@ impl Tracer {
         scene: &Scene<'_, T>,
         blur: (f64, f64),
     ) -> bool {
+        if !self.trace_open(table, scene, blur) {
+            return false;
+        }
+        if self.unfit > COVERED_SHARE {
+            self.covered = self.uncover(table, scene);
+            if !self.covered {
+                return self.trace_again(table, scene, blur);
+            }
+        }
+        true
+    }
+
+    /// Locates the edge as if nothing covered it.
+    #[inline(always)]
+    fn trace_open<T: Grey>(
+        &mut self,
+        table: &StepTable,
+        scene: &Scene<'_, T>,
+        blur: (f64, f64),
+    ) -> bool {
         let Some(seen) = &self.seen else { return false };
         let Some(shape) = self.overlay.shape(table, seen, blur) else { return false };
         let aside = shape.step.at;
@@ -200,6 +256,22 @@ impl Tracer {
             }
         }
         true
+    }
+
+    /// Traces once more as if nothing covered the edge.
+    #[inline(always)]
+    fn trace_again<T: Grey>(
+        &mut self,
+        table: &StepTable,
+        scene: &Scene<'_, T>,
+        blur: (f64, f64),
+    ) -> bool {
+        self.clear.clear();
+        let picked = std::mem::take(&mut self.picked);
+        let rough = picked.iter().map(|at| at.is_finite().then_some(*at));
+        let seen = self.look(table, scene, rough);
+        self.picked = picked;
+        seen.is_some() && self.trace_open(table, scene, blur)
     }
 
     /// Locates the edge anew, line by line, where it is not a blurred step.
@@ -227,6 +299,18 @@ impl Tracer {
     /// places in its profile and of its neighbours.
     #[inline(always)]
     fn pick_levels<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        self.pick_raw_levels(scene);
+        path::median_of_three(&mut self.before);
+        path::median_of_three(&mut self.step);
+        path::smooth(&self.before, &mut self.rough);
+        std::mem::swap(&mut self.before, &mut self.rough);
+        path::smooth(&self.step, &mut self.rough);
+        std::mem::swap(&mut self.step, &mut self.rough);
+        self.steady_steps();
+    }
+
+    /// The same, each band for itself.
+    fn pick_raw_levels<T: Grey>(&mut self, scene: &Scene<'_, T>) {
         self.before.clear();
         self.step.clear();
         let inside = 0.45 * scene.width_px;
@@ -242,13 +326,6 @@ impl Tracer {
             self.before.push(before);
             self.step.push(unit * level(profile, at, right) - before);
         }
-        path::median_of_three(&mut self.before);
-        path::median_of_three(&mut self.step);
-        path::smooth(&self.before, &mut self.rough);
-        std::mem::swap(&mut self.before, &mut self.rough);
-        path::smooth(&self.step, &mut self.rough);
-        std::mem::swap(&mut self.step, &mut self.rough);
-        self.steady_steps();
     }
 
     /// Steps that are small or turned over against the others are not believed.
@@ -303,37 +380,58 @@ impl Tracer {
     #[inline(always)]
     fn read<T: Grey>(&mut self, scene: &Scene<'_, T>) {
         let course = &self.course;
-        self.sheet.read(scene.strip, scene.lines, course.steepest(), |v| course.at(v)[0]);
+        let most = if self.sort_rows { 1 } else { MOST_TOGETHER };
+        let how = (course.steepest(), most);
+        self.sheet.read(scene.strip, scene.lines, how, |v| course.at(v)[0]);
     }
 
     /// Holds every window against the edge.
     #[inline(always)]
     fn hold<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        let stiffness = narrow(self.template.products.slope_slope);
         self.groups.clear();
         self.plain.clear();
         self.plain.resize(scene.lines.len(), PlainSums::default());
         for (number, window) in self.sheet.windows().iter().enumerate() {
+            let (band, weight) = (window.line, window.rows);
+            if self.clear.get(number) == Some(&false) {
+                self.groups.push(Group::hidden(band, weight));
+                continue;
+            }
             let [path, before, step] = self.course.at(window.middle);
-            let at = Template::sampled(path);
-            let noise = MANY_SIGMA * scene.noise / window.rows.sqrt();
-            let expected = Expected {
-                at,
-                before,
-                step,
-                tolerance: noise + 0.05 * step.abs(),
-                tolerance_at_step: noise + 0.15 * step.abs(),
-            };
+            let expected = self.expected([path, before, step], scene.noise, weight);
             let pixels = (self.sheet.pixels(number).as_slice(), window.first);
-            let plain = &mut self.plain[window.line];
-            let sums = self.template.hold(pixels, &expected, plain);
-            self.groups.push(Group {
-                band: window.line,
-                weight: window.rows,
-                ahead: at - path,
-                sums: sums.unwrap_or(RowSums::OUT_OF_SIGHT),
-                misfit: 0.0,
-            });
+            let sums = self.template.hold(pixels, &expected, &mut self.plain[band]);
+            let sums = sums.unwrap_or(RowSums::OUT_OF_SIGHT);
+            let ahead = expected.at - path;
+            let moved = ahead - sums.slope / (step * stiffness);
+            let misfit = self.misfit(&sums, weight);
+            self.groups.push(Group { band, weight, ahead, sums, moved, misfit });
         }
+    }
+
+    /// What the mean of some rows is held against.
+    #[inline(always)]
+    fn expected(&self, [path, before, step]: [f32; 3], noise: f32, weight: f32) -> Expected {
+        let noise = MANY_SIGMA * noise / weight.sqrt();
+        Expected {
+            at: Template::sampled(path),
+            before,
+            step,
+            tolerance: noise + 0.05 * step.abs(),
+            tolerance_at_step: noise + 0.15 * step.abs(),
+        }
+    }
+
+    /// Sum of the squares of what does not fit, as if of a single row, so that
+    /// groups of all sizes compare \[grey levels²\].
+    #[inline(always)]
+    fn misfit(&self, sums: &RowSums, weight: f32) -> f32 {
+        if sums.wild > FEW_WILD {
+            return f32::INFINITY;
+        }
+        let stiffness = narrow(self.template.products.slope_slope);
+        weight * (sums.squares - sums.slope * sums.slope / stiffness)
     }
 
     /// Sums up the rows of each band, without those on which a grain or a
@@ -341,17 +439,14 @@ impl Tracer {
     #[inline(always)]
     fn gather<T: Grey>(&mut self, scene: &Scene<'_, T>) {
         let products = self.template.products;
-        let stiffness = narrow(products.slope_slope);
         self.sorted.clear();
-        for group in &mut self.groups {
-            let sums = &group.sums;
-            // As if of a single row, so that groups of all sizes compare.
-            group.misfit = if sums.wild > FEW_WILD {
-                f32::INFINITY
-            } else {
-                group.weight * (sums.squares - sums.slope * sums.slope / stiffness)
-            };
-            self.sorted.push(group.misfit);
+        self.sorted.extend(self.groups.iter().map(|group| group.misfit));
+        if !self.clear.is_empty() {
+            // What is hidden says nothing.
+            self.sorted.retain(|misfit| misfit.is_finite());
+        }
+        if self.sorted.is_empty() {
+            self.sorted.push(f32::INFINITY);
         }
         let middle = self.sorted.len() / 2;
         let median = *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
@@ -359,7 +454,13 @@ impl Tracer {
         let noise = scene.noise * scene.noise * (pixels + MANY_SIGMA * (2.0 * pixels).sqrt());
         let limit = noise.max(UNLIKE * median);
         self.misfit = f64::from(median / (scene.noise * scene.noise * pixels)).sqrt();
-        self.spread_misfits(limit);
+        let covered =
+            |group: &&Group| group.misfit > UNFIT * limit || group.misfit == f32::INFINITY;
+        let unfit = self.groups.iter().filter(covered).count();
+        self.unfit = float(unfit) / float(self.groups.len().max(1));
+        if self.clear.is_empty() {
+            self.spread_misfits(limit);
+        }
         self.solved.clear();
         let mut first = 0;
         for band in 0..scene.lines.len() {
@@ -398,9 +499,9 @@ impl Tracer {
         let stiffness = narrow(core[(0, 0)]);
         let [_, _, step] = self.course.at(narrow(pool::middle(scene.lines[band])));
         let groups = &self.groups[groups];
-        let moved = |group: &Group| group.ahead - group.sums.slope / (step * stiffness);
         self.sorted.clear();
-        self.sorted.extend(groups.iter().filter(|group| group.misfit <= limit).map(moved));
+        let fitting = groups.iter().filter(|group| group.misfit <= limit);
+        self.sorted.extend(fitting.map(|group| group.moved));
         let typical = median_of_few(&mut self.sorted);
         let noise = MANY_SIGMA * scene.noise / (step.abs() * stiffness.sqrt());
         let widen = |(count, sum): (f32, f32)| (f64::from(count), f64::from(sum));
@@ -412,8 +513,11 @@ impl Tracer {
         };
         for group in groups {
             let far = noise / group.weight.sqrt() + WAVY_PX;
-            let counts = group.misfit <= limit && (moved(group) - typical).abs() <= far;
+            let counts = group.misfit <= limit && (group.moved - typical).abs() <= far;
             sums.all_rows += f64::from(group.weight);
+            if self.clear.is_empty() || group.misfit < f32::INFINITY {
+                sums.held_rows += f64::from(group.weight);
+            }
             if counts {
                 sums.add(group, core);
             }
@@ -432,16 +536,18 @@ impl Tracer {
         let core = self.template.products.matrix();
         let extra = [0, 1].map(|side| self.extra_variance(core, variance, side));
         let plain = self.template.plain_pixels();
+        let least_share = if self.clear.is_empty() { LEAST_SHARE } else { LEAST_CLEAR_SHARE };
         self.edges.clear();
         let mut off: f64 = 0.0;
         for (band, sums) in self.solved.iter().enumerate() {
-            let located = sums.solve(core, variance, extra, plain).map(|(moved, located)| {
-                let bent = moved / blur;
-                let moved = moved * (1.0 + bent * bent / 12.0);
-                off = off.max(moved.abs());
-                let [path, _, _] = self.course.at(narrow(pool::middle(scene.lines[band])));
-                Located { at: f64::from(path) + moved, ..located }
-            });
+            let located =
+                sums.solve(core, variance, extra, plain, least_share).map(|(moved, located)| {
+                    let bent = moved / blur;
+                    let moved = moved * (1.0 + bent * bent / 12.0);
+                    off = off.max(moved.abs());
+                    let [path, _, _] = self.course.at(narrow(pool::middle(scene.lines[band])));
+                    Located { at: f64::from(path) + moved, ..located }
+                });
             self.edges.push(located);
         }
         if off <= NEAR_ENOUGH * blur {
@@ -486,6 +592,14 @@ impl Tracer {
     }
 }
 
+impl Group {
+    /// Rows that are not to be held.
+    fn hidden(band: usize, weight: f32) -> Self {
+        let (ahead, moved, misfit) = (0.0, 0.0, f32::INFINITY);
+        Self { band, weight, ahead, sums: RowSums::default(), moved, misfit }
+    }
+}
+
 impl BandSums {
     fn add(&mut self, group: &Group, core: &Matrix3<f64>) {
         let (sums, weight) = (&group.sums, f64::from(group.weight));
@@ -506,14 +620,15 @@ impl BandSums {
         variance: f64,
         extra: [f64; 2],
         plain: [f64; 2],
+        least_share: f64,
     ) -> Option<(f64, Located)> {
-        if self.rows < LEAST_SHARE * self.all_rows {
+        if self.rows < least_share * self.all_rows || self.rows < 1.0 {
             return None;
         }
         let mut matrix = core * self.rows;
         let mut vector = Vector3::from(self.vector);
         for (side, (count, sum)) in [self.before, self.after].into_iter().enumerate() {
-            if count >= LEAST_PLAIN * plain[side] * self.all_rows {
+            if count >= LEAST_PLAIN * plain[side] * self.held_rows {
                 let weight = 1.0 / (1.0 / count + extra[side] / variance);
                 matrix[(side + 1, side + 1)] += weight;
                 vector[side + 1] += weight * sum / count;

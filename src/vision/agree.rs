@@ -1,0 +1,168 @@
+//! Values along the bead of which many may be wrong: the line or the parabola
+//! that most of them agree on. What covers an edge pulls to one side, so that
+//! means and medians of all of them go astray.
+
+use super::normal::Normal;
+
+/// Lines and parabolas that are tried.
+const TRIALS: usize = 160;
+/// By so many values more a parabola must hold than a line to be believed.
+const BENT: f32 = 3.0;
+/// Fits through the values that agree.
+const FITS: usize = 2;
+
+/// A parabola over the numbers of the values.
+#[derive(Debug, Clone, Copy)]
+struct Parabola {
+    middle: f32,
+    terms: [f32; 3],
+}
+
+/// Turns values that lie farther than a tolerance from what most agree on into
+/// gaps, which are NaN. Returns how many are left.
+pub fn agree(values: &mut [f32], tolerance: f32) -> usize {
+    let Some(mut found) = search(values, tolerance) else { return count(values) };
+    for _ in 0..FITS {
+        found = found.fitted(values, tolerance).unwrap_or(found);
+    }
+    for (k, value) in values.iter_mut().enumerate() {
+        let off = (*value - found.at(k)).abs();
+        if off.is_nan() || off > tolerance {
+            *value = f32::NAN;
+        }
+    }
+    count(values)
+}
+
+fn count(values: &[f32]) -> usize {
+    values.iter().filter(|value| value.is_finite()).count()
+}
+
+/// The best of the curves through values that are picked at random, though the
+/// same ones every time.
+fn search(values: &[f32], tolerance: f32) -> Option<Parabola> {
+    let mut state = 0x2545_f491_u32;
+    let mut pick = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        usize::try_from(state >> 8).unwrap_or(0) % values.len()
+    };
+    if count(values) < 4 {
+        return None;
+    }
+    let mut best: [Option<(f32, Parabola)>; 2] = [None; 2];
+    for _ in 0..TRIALS {
+        let mut places = [pick(), pick(), pick()];
+        places.sort_unstable();
+        let [first, second, third] = places;
+        if first == second || second == third || places.iter().any(|&k| !values[k].is_finite()) {
+            continue;
+        }
+        let line = Parabola::line(values, first, third);
+        for (best, curve) in best.iter_mut().zip([line, line.bent_to(values, second, first, third)])
+        {
+            let score = curve.score(values, tolerance);
+            if best.is_none_or(|(most, _)| score > most) {
+                *best = Some((score, curve));
+            }
+        }
+    }
+    let [line, bent] = best;
+    match (line, bent) {
+        (Some((few, _)), Some((many, curve))) if many > few + BENT => Some(curve),
+        (line, _) => line.map(|(_, curve)| curve),
+    }
+}
+
+impl Parabola {
+    fn line(values: &[f32], first: usize, third: usize) -> Self {
+        let middle = float(values.len() - 1) / 2.0;
+        let slope = (values[third] - values[first]) / float(third - first);
+        let level = values[first] + slope * (middle - float(first));
+        Self { middle, terms: [level, slope, 0.0] }
+    }
+
+    /// The parabola that leaves a line's two places where they are and goes
+    /// through a third.
+    fn bent_to(self, values: &[f32], at: usize, first: usize, third: usize) -> Self {
+        let bend = (values[at] - self.at(at)) / (float(at - first) * -float(third - at));
+        // bend · (x − first) · (x − third), about the middle.
+        let (a, b) = (self.middle - float(first), self.middle - float(third));
+        let [level, slope, _] = self.terms;
+        Self { terms: [level + bend * a * b, slope + bend * (a + b), bend], ..self }
+    }
+
+    fn at(&self, k: usize) -> f32 {
+        let x = float(k) - self.middle;
+        let [level, slope, bend] = self.terms;
+        level + x * (slope + x * bend)
+    }
+
+    /// Number of the values that it holds, of those half-way out a part.
+    fn score(&self, values: &[f32], tolerance: f32) -> f32 {
+        let one = |(k, value): (usize, &f32)| {
+            let off = (value - self.at(k)) / tolerance;
+            // NaN counts nothing.
+            (1.0 - off * off).max(0.0)
+        };
+        values.iter().enumerate().map(one).sum()
+    }
+
+    /// The best one of the same order through the values that agree.
+    fn fitted(&self, values: &[f32], tolerance: f32) -> Option<Self> {
+        let mut normal = Normal::<3>::default();
+        for (k, &value) in values.iter().enumerate() {
+            let miss = value - self.at(k);
+            if miss.abs() <= tolerance {
+                let x = f64::from(float(k) - self.middle);
+                normal.add([1.0, x, x * x], miss.into(), 1.0);
+            }
+        }
+        if self.terms[2] == 0.0 {
+            normal.hold(2, 1e12, 0.0);
+        }
+        let moved = normal.solve()?.unknowns;
+        let mut terms = self.terms;
+        for (term, moved) in terms.iter_mut().zip(moved.iter()) {
+            #[expect(clippy::cast_possible_truncation, reason = "the quantity needs no more")]
+            let moved = *moved as f32;
+            *term += moved;
+        }
+        if self.terms[2] == 0.0 {
+            terms[2] = 0.0;
+        }
+        Some(Self { terms, ..*self })
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "there are few values")]
+fn float(number: usize) -> f32 {
+    number as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(of: impl Fn(f32) -> f32) {
+        let mut values: Vec<f32> = (0..30).map(|k| of(float(k))).collect();
+        let wrong = [1, 2, 3, 9, 10, 14, 15, 16, 17, 22, 25, 26, 28];
+        for (n, &k) in wrong.iter().enumerate() {
+            values[k] += 1.5 + 0.3 * float(n);
+        }
+        values[5] = f32::NAN;
+        assert_eq!(agree(&mut values, 0.8), 30 - wrong.len() - 1);
+        assert!(wrong.iter().all(|&k| values[k].is_nan()));
+    }
+
+    #[test]
+    fn two_values_in_five_may_be_wrong_to_the_same_side() {
+        check(|x| 40.0 + 0.2 * x);
+        check(|x| 40.0 + 0.2 * x - 0.03 * x * x);
+    }
+
+    #[test]
+    fn few_values_are_left_as_they_are() {
+        let mut values = [1.0, f32::NAN, 9.0, 3.0];
+        assert_eq!(agree(&mut values, 0.8), 3);
+    }
+}

@@ -1,0 +1,307 @@
+//! An edge that grains or spots cover in part: which rows show it and nothing
+//! else. All that is known of it is taken from those rows alone.
+
+use super::{MANY_SIGMA, Tracer, narrow, typical};
+use crate::vision::agree::agree;
+use crate::vision::overlay::{Extent, Shape};
+use crate::vision::path;
+use crate::vision::pool;
+use crate::vision::step::StepTable;
+use crate::vision::strip::Grey;
+use crate::vision::template::{PlainSums, Template};
+use crate::vision::trace::Scene;
+
+/// Distance from the course of most bands from which a band is off \[px\].
+const OFF_PX: f32 = 0.8;
+/// The same for a level, as a share of the step, and in standard deviations of
+/// a pixel beside.
+const OFF_LEVEL: f32 = 0.08;
+const OFF_LEVEL_SIGMA: f32 = 1.0;
+/// How often rows are judged, each time by an edge that was read from those
+/// which passed before.
+const PASSES: usize = 3;
+/// Percentage of the rows that is taken to be clear whatever happens: the one
+/// that fits worst of them tells what fits.
+const SURELY_CLEAR: usize = 30;
+/// By how much the squares that a row leaves may exceed that one's.
+const UNLIKE: f32 = 3.2;
+/// The same at most, as a multiple of what noise leaves.
+const MOST_UNLIKE: f32 = 3.0;
+/// Farthest that the levels beside an edge may be from those a little away, as
+/// a share of the step: grains have levels of their own.
+const OTHER_LEVELS: f64 = 0.25;
+/// Courses that are tried, and the share of clear rows along one that is enough
+/// to look for no other.
+const ATTEMPTS: usize = 3;
+const SURE: f32 = 0.4;
+const NONE_CLEAR: f32 = 0.0;
+/// Farthest that a clear row's edge lies from its neighbours', in standard
+/// deviations.
+const FAR_SIGMA: f32 = 3.5;
+/// What covers a row shades those beside it through the blur: so many blurs of
+/// distance are kept from it, fewer where little else is left.
+const BESIDE_BLURS: [f64; 4] = [2.0, 1.5, 1.0, 0.5];
+/// Share of the rows, and number of them, that are wanted and needed.
+const WANTED: (f32, f32) = (0.25, 20.0);
+const NEEDED: (f32, f32) = (0.12, 12.0);
+/// Share of the rows that may show the same edge elsewhere, one after the
+/// other: more are not covered, but a bead of another shape.
+const ELSEWHERE: f32 = 0.08;
+/// Distance from which on a row's edge is elsewhere \[px\].
+const ELSEWHERE_PX: f32 = 1.0;
+
+impl Tracer {
+    /// Locates an edge from the rows that show it and nothing else. Returns
+    /// whether there are enough of them.
+    #[inline(always)]
+    pub(super) fn uncover<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
+        self.sort_rows = true;
+        self.free.clear();
+        self.free.extend_from_slice(&self.picked);
+        let mut best = (NONE_CLEAR, 0);
+        for attempt in 0..ATTEMPTS {
+            let clear = self.try_course(table, scene).unwrap_or(NONE_CLEAR);
+            if clear >= SURE {
+                best = (clear, attempt);
+                break;
+            }
+            if clear > best.0 {
+                best = (clear, attempt);
+                std::mem::swap(&mut self.free, &mut self.best_free);
+                self.free.clear();
+                self.free.extend_from_slice(&self.best_free);
+            }
+            if attempt + 1 < ATTEMPTS {
+                self.set_course_aside();
+            }
+        }
+        if best.0 == NONE_CLEAR {
+            return false;
+        }
+        if best.0 < SURE {
+            std::mem::swap(&mut self.free, &mut self.best_free);
+            if self.try_course(table, scene).is_none() {
+                return false;
+            }
+        }
+        let Some(shape) = self.read_shape(table, scene) else { return false };
+        self.template.tabulate(table, &shape);
+        self.blur_px = shape.step.blur;
+        self.common_variance = shape.variance;
+        self.hold(scene);
+        self.gather(scene);
+        self.locate(scene, shape.step.blur);
+        true
+    }
+
+    /// Tells the clear rows along the course that most of the free bands agree
+    /// on, and their share. `None` where there are too few.
+    #[inline(always)]
+    fn try_course<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> Option<f32> {
+        self.clear.clear();
+        if !self.take_course(scene) {
+            return None;
+        }
+        self.read(scene);
+        let (windows, trusted) = (self.sheet.windows(), &self.trusted);
+        let clear = |number: usize| trusted[scene.bands.band_of(windows[number].middle)];
+        self.overlay.settle(&self.sheet, &self.course, clear);
+        for _ in 0..PASSES {
+            let shape = self.read_shape(table, scene)?;
+            self.template.tabulate(table, &shape);
+            self.clear.clear();
+            self.hold(scene);
+            if !self.judge_rows(scene, shape.step.blur) {
+                return None;
+            }
+            self.follow(scene);
+            self.read(scene);
+            let clear = &self.clear;
+            self.overlay.lay_clear(&self.sheet, &self.course, |number| clear[number]);
+        }
+        Some(self.clear_share())
+    }
+
+    /// Takes the bands that agreed out of those that are free to.
+    fn set_course_aside(&mut self) {
+        for (free, trusted) in self.free.iter_mut().zip(&self.trusted) {
+            if *trusted {
+                *free = f32::NAN;
+            }
+        }
+    }
+
+    /// The course that most bands agree on, in place and levels.
+    fn take_course<T: Grey>(&mut self, scene: &Scene<'_, T>) -> bool {
+        self.rough.clear();
+        self.rough.extend_from_slice(&self.free);
+        if agree(&mut self.rough, OFF_PX) < 4 {
+            return false;
+        }
+        self.trusted.clear();
+        self.trusted.extend(self.rough.iter().map(|at| at.is_finite()));
+        self.fill_rough();
+        std::mem::swap(&mut self.rough, &mut self.path);
+        self.pick_raw_levels(scene);
+        let step = typical(&self.step).abs();
+        let off = OFF_LEVEL * step + OFF_LEVEL_SIGMA * scene.noise;
+        // The level after the edge stands in for the step until it is smooth.
+        for (step, before) in self.step.iter_mut().zip(&self.before) {
+            *step += before;
+        }
+        std::mem::swap(&mut self.before, &mut self.rough);
+        agree(&mut self.rough, off);
+        self.fill_rough();
+        std::mem::swap(&mut self.before, &mut self.rough);
+        std::mem::swap(&mut self.step, &mut self.rough);
+        agree(&mut self.rough, off);
+        self.fill_rough();
+        std::mem::swap(&mut self.step, &mut self.rough);
+        for (step, before) in self.step.iter_mut().zip(&self.before) {
+            *step -= before;
+        }
+        self.steady_steps();
+        self.course.draw(scene.bands, &self.path, &self.before, &self.step);
+        true
+    }
+
+    /// Fills the gaps of rough values and smooths them.
+    fn fill_rough(&mut self) {
+        let values = self.rough.iter().map(|value| value.is_finite().then_some(*value));
+        path::fill(values, &mut self.sorted);
+        path::smooth(&self.sorted, &mut self.rough);
+    }
+
+    /// Reads the edge's shape from the overlay and takes it over. Rows are
+    /// known to be clear about the edge only: beside it spots may lie anywhere,
+    /// and would pass for shading.
+    fn read_shape<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> Option<Shape> {
+        let noise = f64::from(scene.noise) / f64::from(typical(&self.step).abs());
+        let room = self.room(scene);
+        let look = self.overlay.look(table, noise, room)?;
+        let core = Template::core_half(look.step.blur);
+        let room = Extent { before: room.before.min(core), after: room.after.min(core) };
+        let look = self.overlay.look(table, noise, room)?;
+        let shape = self.overlay.shape(table, &look, (look.step.blur, f64::INFINITY))?;
+        let other = f64::max(shape.step.before.abs(), (shape.step.after - 1.0).abs());
+        if other > OTHER_LEVELS {
+            return None;
+        }
+        Some(self.adopt(shape))
+    }
+
+    /// Tells which rows are clear; returns whether there are enough.
+    #[inline(always)]
+    fn judge_rows<T: Grey>(&mut self, scene: &Scene<'_, T>, blur: f64) -> bool {
+        let limit = self.limit_of_rows(scene.noise);
+        let far = self.far_of_rows(scene, limit);
+        let weight = self.groups.first().map_or(1.0, |group| group.weight);
+        let rows = float(scene.strip.along);
+        for blurs in BESIDE_BLURS {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a few rows"
+            )]
+            let reach = (blurs * blur / f64::from(weight)).ceil() as usize;
+            self.clear.clear();
+            for (k, group) in self.groups.iter().enumerate() {
+                let near = k.saturating_sub(reach)..(k + reach + 1).min(self.groups.len());
+                let hit = self.groups[near].iter().any(|group| group.misfit > limit);
+                self.clear.push(!hit && group.moved.abs() <= far);
+            }
+            let clear = self.clear_share() * rows;
+            if clear >= f32::max(WANTED.0 * rows, WANTED.1) {
+                break;
+            }
+        }
+        let clear = self.clear_share() * rows;
+        clear >= f32::max(NEEDED.0 * rows, NEEDED.1)
+            && self.elsewhere(scene, limit) <= ELSEWHERE * rows
+    }
+
+    /// Squares that a clear row leaves at most.
+    fn limit_of_rows(&mut self, noise: f32) -> f32 {
+        self.sorted.clear();
+        self.sorted.extend(self.groups.iter().map(|group| group.misfit));
+        let rank = self.sorted.len() * SURELY_CLEAR / 100;
+        let sure = *self.sorted.select_nth_unstable_by(rank, f32::total_cmp).1;
+        let pixels = narrow(self.template.products.pixels);
+        let noise = noise * noise * (pixels + MANY_SIGMA * (2.0 * pixels).sqrt());
+        noise.max(f32::min(UNLIKE * sure, MOST_UNLIKE * noise))
+    }
+
+    /// How far the edge of a clear row lies from the course at most \[px\].
+    fn far_of_rows<T: Grey>(&mut self, scene: &Scene<'_, T>, limit: f32) -> f32 {
+        let stiffness = narrow(self.template.products.slope_slope);
+        let step = typical(&self.step).abs();
+        let weight = self.groups.first().map_or(1.0, |group| group.weight);
+        let noise = scene.noise / (step * stiffness.sqrt() * weight.sqrt());
+        self.sorted.clear();
+        let likely = self.groups.iter().filter(|group| group.misfit <= limit);
+        self.sorted.extend(likely.map(|group| group.moved.abs()));
+        if self.sorted.is_empty() {
+            return FAR_SIGMA * noise;
+        }
+        let middle = self.sorted.len() / 2;
+        let median = *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+        FAR_SIGMA * noise.max(1.48 * median)
+    }
+
+    fn clear_share(&self) -> f32 {
+        let clear = self.clear.iter().filter(|clear| **clear).count();
+        float(clear) / float(self.clear.len().max(1))
+    }
+
+    /// Longest run of rows that do not fit, but show the same edge where their
+    /// band has one.
+    #[inline(always)]
+    fn elsewhere<T: Grey>(&self, scene: &Scene<'_, T>, limit: f32) -> f32 {
+        let (mut longest, mut run) = (0.0f32, 0.0);
+        let windows = self.sheet.windows();
+        for (number, (group, clear)) in self.groups.iter().zip(&self.clear).enumerate() {
+            let window = &windows[number];
+            let at = self.picked[scene.bands.band_of(window.middle)];
+            let [path, before, step] = self.course.at(window.middle);
+            if *clear || group.misfit <= limit || at.is_nan() || (at - path).abs() < ELSEWHERE_PX {
+                run = 0.0;
+                continue;
+            }
+            let expected = self.expected([at, before, step], scene.noise, group.weight);
+            let mut plain = PlainSums::default();
+            let pixels = (self.sheet.pixels(number).as_slice(), window.first);
+            let sums = self.template.hold(pixels, &expected, &mut plain);
+            let fits = sums.is_some_and(|sums| self.misfit(&sums, group.weight) <= limit);
+            run = if fits { run + group.weight } else { 0.0 };
+            longest = longest.max(run);
+        }
+        longest
+    }
+
+    /// Leads the course through the clear rows.
+    fn follow<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        self.rough.clear();
+        let mut first = 0;
+        for band in 0..scene.lines.len() {
+            let (mut sum, mut n) = (0.0, 0.0);
+            while first < self.groups.len() && self.groups[first].band == band {
+                if self.clear[first] {
+                    sum += self.groups[first].moved;
+                    n += 1.0;
+                }
+                first += 1;
+            }
+            self.rough.push(if n > 0.0 { sum / n } else { f32::NAN });
+        }
+        self.fill_rough();
+        for (at, &line) in self.rough.iter_mut().zip(scene.lines) {
+            *at += self.course.at(narrow(pool::middle(line)))[0];
+        }
+        self.course.redraw(scene.lines, &self.rough, &mut self.memory);
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+fn float(number: usize) -> f32 {
+    number as f32
+}
