@@ -11,6 +11,8 @@
 //! pair     contours → the two edges of the bead
 //! trace    contour → sub-pixel places, one a caliper line, from all rows:
 //!          path, overlay (blur, surroundings), template, bands
+//! cut_off  the same for edges one side of which passes the end of the
+//!          camera's scale (censor)
 //! refine   the same for edges that are no blurred steps (fit, blur)
 //! outlier  places that disagree with their neighbours
 //! axis     places → width normal to the bead, on the surface (curve, scatter)
@@ -30,8 +32,10 @@
 mod agree;
 mod axis;
 mod blur;
+mod censor;
 mod contour;
 mod curve;
+mod cut_off;
 mod edge;
 mod edge_lines;
 mod fit;
@@ -48,6 +52,7 @@ mod phase;
 mod pool;
 mod refine;
 pub mod reject;
+mod saturated;
 mod scatter;
 mod sheet;
 mod step;

@@ -16,8 +16,8 @@ use crate::sim::sets::{self, Set};
 use crate::sim::studio::Studio;
 use crate::vision::Measurer;
 
-/// Frames that one measurer measures after each other.
-const RUN: u64 = 50;
+/// Frames that one measurer measures after each other, as in a cell.
+const RUN: u64 = 250;
 
 /// Measures rendered sets of pictures and says how far off the widths are.
 #[derive(Debug, Args)]

@@ -15,6 +15,7 @@ use super::outlier;
 use super::pair::{self, Pair, Search};
 use super::pool::{self, Bands};
 use super::reject::Reject;
+use super::saturated;
 use super::step::StepTable;
 use super::strip::{Grey, Strip, Strips, Turner, View};
 use super::trace::{Scene, Tracer};
@@ -30,9 +31,6 @@ const NEED_ROWS: f64 = 0.4;
 const NEED_CLEAR_ROWS: f64 = 0.1;
 /// Share of saturated pixels from which missing contrast is laid to light.
 const MUCH_LIGHT: f64 = 0.3;
-/// Share of the brighter side's pixels that may be saturated: noise about the
-/// end of the scale saturates half of them.
-const CUT_OFF: f64 = 0.9;
 /// Room that a search allows beyond the range of widths, for the difference
 /// between one caliper and the mean of all.
 const RANGE_SLACK: f64 = 1.5;
@@ -211,7 +209,6 @@ impl Work {
         pool::cut(strip.along, self.gauge.calipers, &mut self.lines);
         self.find_candidates();
         let pair = self.find_pair(range)?;
-        self.check_light(pair)?;
         self.trace(strip, pair)?;
         self.sort_out()?;
         self.check_contrast()?;
@@ -260,6 +257,14 @@ impl Work {
         let right = self.right.look(&self.table, &right_scene, rights.iter().copied());
         let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
         if let (Some(left), Some(right)) = (left, right) {
+            let cut_off = [self.left.is_cut_off(&scene), self.right.is_cut_off(&right_scene)];
+            if cut_off != [[false; 2]; 2] {
+                self.least_off_px = OFF_PX;
+                let tracers = [&mut self.left, &mut self.right];
+                let bead = saturated::Bead { scenes: [scene, right_scene], lefts, rights };
+                self.noise = bead.trace(tracers, &self.table, cut_off)?;
+                return Ok(());
+            }
             let blur = common_blur(left, right);
             let left = self.left.trace(&self.table, &scene, blur);
             let right = self.right.trace(&self.table, &right_scene, blur);
@@ -326,19 +331,6 @@ impl Work {
             };
         }
         best
-    }
-
-    /// Refuses a picture whose brighter side is cut off at the end of the
-    /// scale: where half-way up the step is cannot be told then.
-    fn check_light(&mut self, found: Found) -> Result<(), Reject> {
-        let (lefts, rights) = found.sides(&self.ups, &self.downs);
-        let (left, right) = (&lefts.all()[found.pair.left].at, &rights.all()[found.pair.right].at);
-        let bead = f64::from(narrowest(left, right, &mut self.memory));
-        #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-        let across = self.bands.profile(0).len() as f64;
-        let bright = if found.bright { bead } else { across - bead };
-        let got = self.bands.saturated_share() * across / bright.max(1.0);
-        if got > CUT_OFF { Err(Reject::Saturated { got, limit: CUT_OFF }) } else { Ok(()) }
     }
 
     fn too_much_light(&self) -> Option<Reject> {

@@ -63,4 +63,9 @@ impl<const N: usize> Solved<N> {
         one[which] = 1.0;
         self.cholesky.solve(&one)[which]
     }
+
+    /// Covariance of the unknowns, for observations of variance 1.
+    pub fn covariance(&self) -> SMatrix<f64, N, N> {
+        self.cholesky.inverse()
+    }
 }

@@ -28,6 +28,8 @@ const UNLIKE: [f32; 2] = [2.0, 1.7];
 /// may be covered, and how often anew.
 const ALIKE: f32 = 0.3;
 const SETTLES: usize = 5;
+/// The same for rows that are cut off at the end of the scale.
+const VERY_UNLIKE: f32 = 3.5;
 /// Blur that the place's rounding to half a pixel adds \[px²\].
 const ROUNDING: f64 = 1.0 / 48.0;
 
@@ -84,7 +86,7 @@ pub struct Look {
     /// Standard deviation of a row's samples about the step, in shares of it.
     noise: f64,
     /// How far there is nothing but this edge.
-    room: Extent,
+    pub room: Extent,
 }
 
 /// An edge as the overlay shows it.
@@ -103,13 +105,16 @@ pub struct Shape {
 }
 
 /// How a window was laid down: at which phase, how far the path lies ahead of
-/// its pixel \[px\], and of how many rows it is.
+/// its pixel \[px\], of how many rows it is, and the level before the edge and
+/// the step that were expected \[grey levels\].
 #[derive(Debug, Clone, Copy)]
 struct Laid {
     number: usize,
     phase: usize,
     ahead: f32,
     rows: f32,
+    before: f32,
+    step: f32,
 }
 
 /// Lays rows over each other; keeps its memory from frame to frame.
@@ -123,6 +128,61 @@ pub struct Overlay {
     counts: [f32; PHASES],
     /// Mean distance of the path from the pixels' places in each phase \[px\].
     shifts: [f32; PHASES],
+    /// How unlike the mean a row is in the median.
+    typical: f32,
+}
+
+/// Mean of rows of one part along the bead, all at nearly the same place
+/// between pixels.
+#[derive(Debug, Clone)]
+pub struct Profile {
+    /// Samples \[grey levels\].
+    pub mean: [f32; SPAN],
+    /// Number of rows.
+    pub rows: f64,
+    /// Mean distance of the path from the middle sample \[px\].
+    pub shift: f64,
+    /// Variance of that distance \[px²\].
+    pub spread: f64,
+    /// Mean of the levels that were expected before the edge and after it
+    /// \[grey levels\].
+    pub levels: [f64; 2],
+}
+
+impl Profile {
+    const EMPTY: Self =
+        Self { mean: [0.0; SPAN], rows: 0.0, shift: 0.0, spread: 0.0, levels: [0.0; 2] };
+
+    fn add(&mut self, row: &[f32; SPAN], laid: &Laid) {
+        let Laid { ahead, rows, before, step, .. } = *laid;
+        for (sum, sample) in self.mean.iter_mut().zip(row) {
+            *sum += rows * (before + step * sample);
+        }
+        let (ahead, rows) = (f64::from(ahead), f64::from(rows));
+        self.rows += rows;
+        self.shift += rows * ahead;
+        self.spread += rows * ahead * ahead;
+        self.levels[0] += rows * f64::from(before);
+        self.levels[1] += rows * f64::from(before + step);
+    }
+
+    /// Sums become means.
+    fn finish(&mut self) {
+        let share = 1.0 / self.rows;
+        #[expect(clippy::cast_possible_truncation, reason = "a share")]
+        self.mean.iter_mut().for_each(|value| *value *= share as f32);
+        self.shift *= share;
+        self.spread = (share * self.spread - self.shift * self.shift).max(0.0);
+        self.levels = self.levels.map(|level| share * level);
+    }
+
+    /// Each sample's distance from the path and its value, from a distance to
+    /// another \[px\].
+    pub fn samples(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
+        let first = index((from + self.shift).ceil());
+        let last = index((to + self.shift).floor() + 1.0);
+        (first..last).map(|k| (place(k) - self.shift, f64::from(self.mean[k])))
+    }
 }
 
 impl Default for Overlay {
@@ -135,6 +195,7 @@ impl Default for Overlay {
             mean: [[0.0; SPAN]; PHASES],
             counts: [0.0; PHASES],
             shifts: [0.0; PHASES],
+            typical: f32::INFINITY,
         }
     }
 }
@@ -148,8 +209,8 @@ impl Overlay {
         let [first, last] = UNLIKE;
         let limit = first * self.judge(0.5);
         self.average(limit, JUDGED);
-        let limit = last * self.judge(0.5);
-        self.average(limit, 0..SPAN);
+        self.typical = self.judge(0.5);
+        self.average(last * self.typical, 0..SPAN);
     }
 
     /// Lays down windows along a path of which many may be covered: starts from
@@ -198,7 +259,7 @@ impl Overlay {
                 *sample = pixel * scale - shift;
             }
             self.rows.push(row);
-            self.phases.push(Laid { number, phase, ahead, rows: window.rows });
+            self.phases.push(Laid { number, phase, ahead, rows: window.rows, before, step });
         }
         self.unlike.clear();
         self.unlike.resize(self.rows.len(), 0.0);
@@ -255,6 +316,25 @@ impl Overlay {
         *self.sorted.select_nth_unstable_by(rank, f32::total_cmp).1
     }
 
+    /// Means of the rows in several parts along the bead, as grey levels. Only
+    /// rows that are very unlike the others are left out: of pixels that are cut
+    /// off above, more lie far below their mean than above it, and leaving them
+    /// out would lift it.
+    pub fn profiles(&self, parts: usize, profiles: &mut Vec<Profile>) {
+        profiles.clear();
+        profiles.resize(parts * PHASES, Profile::EMPTY);
+        let count = self.rows.len();
+        for (k, (row, laid)) in self.rows.iter().zip(&self.phases).enumerate() {
+            if self.unlike[k] <= VERY_UNLIKE * self.typical {
+                profiles[k * parts / count * PHASES + laid.phase].add(row, laid);
+            }
+        }
+        profiles.retain(|profile| profile.rows > 0.0);
+        for profile in profiles {
+            profile.finish();
+        }
+    }
+
     /// Rows that the means are of.
     pub fn used(&self) -> f64 {
         f64::from(self.counts.iter().sum::<f32>())
@@ -288,6 +368,22 @@ impl Overlay {
         let look =
             Look { step, blur_sd: unknown, shading: [0.0; 2], pixel_noise: noise, noise, room };
         self.fit(table, look, None)
+    }
+
+    /// How far the surroundings on one side of a known step are plain \[px\],
+    /// after it or before it, their slope in shares of the step that was given
+    /// \[1/px away from it\], and the variance that its doubt leaves to the
+    /// level at the edge.
+    pub fn beside(
+        &self,
+        table: &StepTable,
+        look: &Look,
+        step: &Step,
+        after: bool,
+    ) -> (f64, (f64, f64)) {
+        let (sign, room) = if after { (1.0, look.room.after) } else { (-1.0, look.room.before) };
+        let (extent, line) = self.plain(table, step, look.pixel_noise, sign, room);
+        (extent, line.sure_slope(look.pixel_noise))
     }
 
     /// Reads the edge's shape from a look at it and what is known of its blur:

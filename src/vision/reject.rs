@@ -26,6 +26,13 @@ pub enum Reject {
         /// Share that is bearable.
         limit: f64,
     },
+    /// Too little of the bead's edges lies below the end of the camera's scale.
+    Blinded {
+        /// Share of the step between ground and bead that can be seen.
+        visible: f64,
+        /// Share that is needed.
+        need: f64,
+    },
     /// A pair was found, but no bead of this cell is that wide.
     WidthOutOfRange {
         /// Width that was found \[mm\].
@@ -69,7 +76,7 @@ impl Reject {
         match self {
             Self::NoPair { .. } => "no_pair",
             Self::LowContrast { .. } => "low_contrast",
-            Self::Saturated { .. } => "saturated",
+            Self::Saturated { .. } | Self::Blinded { .. } => "saturated",
             Self::WidthOutOfRange { .. } => "width_out_of_range",
             Self::Crooked { .. } => "crooked",
             Self::Corner { .. } => "corner",
@@ -98,6 +105,12 @@ impl fmt::Display for Reject {
                 "{:.0} % of the bead or the gauge is saturated, {:.0} % is bearable",
                 got * 100.0,
                 limit * 100.0
+            ),
+            Self::Blinded { visible, need } => write!(
+                f,
+                "{:.0} % of the step between ground and bead lies within the camera's scale; it tells too little of the edge's place, {:.0} % and more are needed",
+                visible * 100.0,
+                need * 100.0
             ),
             Self::WidthOutOfRange { got_mm, min_mm, max_mm } => {
                 write!(f, "width of {got_mm:.2} mm, believed are {min_mm} to {max_mm} mm")

@@ -14,7 +14,8 @@ pub fn on(status: &str) -> (&'static str, &'static str) {
              edges are seen well.",
         ),
         "saturated" => (
-            "So many pixels are at the end of the scale that the edges are lost.",
+            "So much of the bead or the ground passes the end of the scale that too little of the edges \
+             is seen.",
             "Shorten the exposure, dim the light or turn it away from the mirror direction.",
         ),
         "width_out_of_range" => (
@@ -62,6 +63,7 @@ mod tests {
             Reject::NoPair { got: 0.0, need: 0.5 },
             Reject::LowContrast { got: 0.0, need: 6.0 },
             Reject::Saturated { got: 0.5, limit: 0.1 },
+            Reject::Blinded { visible: 0.2, need: 0.4 },
             Reject::WidthOutOfRange { got_mm: 1.0, min_mm: 2.0, max_mm: 3.0 },
             Reject::Crooked { got_rad: 1.0, limit_rad: 0.3 },
             Reject::Corner { got_widths: 0.5, least_widths: 1.5 },

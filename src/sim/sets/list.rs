@@ -89,9 +89,12 @@ fn lit() -> Vec<Set> {
             (picture.light_ratio, picture.light_deg) = (4.0, Some(direction));
         }
     };
-    let saturated = |bead_grey: f64| {
-        move |picture: &mut Picture| (picture.bead_grey, picture.ground_grey) = (bead_grey, 175.0)
+    let saturated = |bead_grey: f64, ground_grey: f64| {
+        move |picture: &mut Picture| {
+            (picture.bead_grey, picture.ground_grey) = (bead_grey, ground_grey);
+        }
     };
+    let glaring = disturbed("saturated-ground", saturated(200.0, 280.0));
     vec![
         disturbed("shading-bead", |picture| {
             picture.shading = Shading { bead_grey_per_px: 1.0, ..shading };
@@ -101,8 +104,11 @@ fn lit() -> Vec<Set> {
         }),
         disturbed("light-across", light(0.0)),
         disturbed("light-along", light(90.0)),
-        disturbed("saturated-255", saturated(255.0)),
-        disturbed("saturated-300", saturated(300.0)),
+        disturbed("saturated-255", saturated(255.0, 175.0)),
+        disturbed("saturated-265", saturated(265.0, 200.0)),
+        disturbed("saturated-280", saturated(280.0, 200.0)),
+        disturbed("saturated-300", saturated(300.0, 175.0)),
+        Set { polarity: Polarity::Dark, ..glaring },
     ]
 }
 

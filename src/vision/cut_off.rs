@@ -1,0 +1,504 @@
+//! An edge one side of which passes the end of the camera's scale. The part of
+//! its flank that can be seen tells place, blur and the level that cannot be
+//! seen together; rows are then held against that step, cut off as they are.
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::censor::{self, Seen};
+use super::normal::Normal;
+use super::overlay::{Overlay, Path, Profile};
+use super::sheet::{Sheet, Window};
+use super::step::StepTable;
+
+/// Parts along the bead that are told apart, because light may change.
+const PARTS: usize = 3;
+const MAX_STEPS: usize = 30;
+/// Steps after which the window stays where it is: a pixel that comes and goes
+/// at its ends keeps a fit from settling.
+const WINDOW_STEPS: usize = 4;
+const LEAST_BLUR_PX: f64 = 0.3;
+/// How far either side is looked at, in blurs and pixels beside.
+const HIDDEN_BLURS: f64 = 3.5;
+const VISIBLE_BLURS: f64 = 3.0;
+const BESIDE_PX: f64 = 12.0;
+/// The hidden level is not expected farther above the end of the scale than so
+/// many times what can be seen, as a standard deviation.
+const FAR_ABOVE: f64 = 2.0;
+/// Share by which blur may change from frame to frame, as a standard deviation.
+const DRIFT: f64 = 0.002;
+/// A blur that differs from that of the frames before by more standard
+/// deviations is another one.
+const ANOTHER: f64 = 4.0;
+/// Levels below which ground says nothing of the light \[grey levels\].
+const DARK: f64 = 25.0;
+/// Rows that fit worse than the median by so many times do not count.
+const UNLIKE: f64 = 2.5;
+/// Standard deviations beyond which a pixel or a row is not noise.
+const MANY_SIGMA: f64 = 4.5;
+/// How far a row may run beside the path \[px\].
+const SLACK_PX: f64 = 0.5;
+/// Wild pixels that a row may have.
+const FEW_WILD: usize = 2;
+
+/// A step of which one level is hidden \[px, grey levels\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// How far it lies from the path.
+    pub at: f64,
+    /// Blur, integration over pixels included.
+    pub blur: f64,
+    /// Level on the side that can be seen.
+    pub visible: f64,
+    /// Level on the other side.
+    pub hidden: f64,
+}
+
+/// What is known of the picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scene {
+    /// Whether the hidden level lies after the edge.
+    pub hidden_after: bool,
+    /// Noise of a pixel \[grey levels\].
+    pub noise: f64,
+    /// End of the scale \[grey levels\].
+    pub white: f64,
+    /// How far there is nothing but this edge on the visible and on the hidden
+    /// side \[px\].
+    pub room: [f64; 2],
+    /// Change of the visible level for each pixel away from the edge
+    /// \[grey levels/px\].
+    pub shading: f64,
+}
+
+/// What a flank tells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found {
+    /// The step.
+    pub step: Step,
+    /// Variance of its place that doubt about blur and hidden level leaves
+    /// \[px²\].
+    pub variance: f64,
+    /// Standard deviation of the blur \[px\].
+    pub blur_sd: f64,
+    /// Share of the step that is not hidden.
+    pub visible_share: f64,
+    /// Mean visible level of the path \[grey levels\].
+    mean_visible: f64,
+}
+
+/// What a caliper line tells of the edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// Distance from the path \[px\].
+    pub moved: f64,
+    /// Variance of it \[px²\].
+    pub variance: f64,
+    /// Share of its rows that count.
+    pub share: f64,
+}
+
+/// Locates edges that are cut off; keeps its memory from frame to frame.
+#[derive(Debug, Clone, Default)]
+pub struct CutOff {
+    profiles: Vec<Profile>,
+    rows: Vec<Row>,
+    sorted: Vec<f64>,
+    /// Blur of the frames before and its standard deviation \[px\].
+    blur: Option<(f64, f64)>,
+}
+
+/// What a row tells.
+#[derive(Debug, Clone, Copy, Default)]
+struct Row {
+    line: usize,
+    matrix: Matrix2<f64>,
+    vector: Vector2<f64>,
+    squares: f64,
+    pixels: f64,
+    wild: usize,
+}
+
+/// Levels in a row or in a mean of rows \[grey levels\].
+#[derive(Debug, Clone, Copy)]
+struct Levels {
+    visible: f64,
+    hidden: f64,
+    /// Light, 1 in the mean.
+    light: f64,
+}
+
+/// A pixel as it is expected, and its derivatives by place, blur, visible and
+/// hidden level.
+struct Expected {
+    seen: Seen,
+    by: [f64; 4],
+}
+
+impl Scene {
+    fn sign(&self) -> f64 {
+        if self.hidden_after { 1.0 } else { -1.0 }
+    }
+
+    /// Ends of what is looked at, as distances from the path \[px\].
+    fn window(&self, step: &Step) -> (f64, f64) {
+        let visible = (VISIBLE_BLURS * step.blur + BESIDE_PX).min(self.room[0]);
+        let hidden = (HIDDEN_BLURS * step.blur).min(self.room[1]);
+        if self.hidden_after {
+            (step.at - visible, step.at + hidden)
+        } else {
+            (step.at - hidden, step.at + visible)
+        }
+    }
+
+    /// Levels where the path has these before and after the edge.
+    fn levels(&self, step: &Step, mean_visible: f64, [before, after]: [f64; 2]) -> Levels {
+        let here = if self.hidden_after { before } else { after };
+        let light = if mean_visible > DARK { (here / mean_visible).clamp(0.5, 2.0) } else { 1.0 };
+        let visible = step.visible + here - mean_visible;
+        Levels { visible, hidden: step.hidden * light, light }
+    }
+
+    /// The pixel at a distance from the path, seen in rows whose places differ
+    /// with a variance.
+    #[inline]
+    fn expect(
+        &self,
+        table: &StepTable,
+        step: &Step,
+        levels: &Levels,
+        (distance, spread): (f64, f64),
+    ) -> Expected {
+        let blur = (step.blur * step.blur + spread).sqrt();
+        let z = self.sign() * (distance - step.at) / blur;
+        let (share, density) = table.at(z);
+        let height = levels.hidden - levels.visible;
+        let depth = blur * (density - z * (1.0 - share));
+        let level = levels.visible + height * share + self.shading * depth;
+        let slope = height * density / blur;
+        let noise = (self.noise * self.noise + slope * slope * spread).sqrt();
+        let seen = censor::seen(table, level, noise, self.white);
+        let by = [-self.sign() * slope, -slope * z, 1.0 - share, levels.light * share];
+        Expected { seen, by: by.map(|by| by * seen.pass) }
+    }
+}
+
+impl CutOff {
+    /// Fits the step to the rows of an overlay along a path. `blur` is what is
+    /// known of the blur: mean and standard deviation \[px\]. `None` where no
+    /// step can be fitted.
+    pub fn fit(
+        &mut self,
+        table: &StepTable,
+        scene: &Scene,
+        overlay: &Overlay,
+        (start, blur): (Step, Option<(f64, f64)>),
+    ) -> Option<Found> {
+        overlay.profiles(PARTS, &mut self.profiles);
+        let mean_visible = self.mean_visible(scene.hidden_after);
+        let mut step = start;
+        let mut window = scene.window(&step);
+        for k in 0..MAX_STEPS {
+            if k < WINDOW_STEPS {
+                window = scene.window(&step);
+            }
+            let (mut normal, misfit) = self.linearise(table, scene, window, &step, mean_visible);
+            let seen = (scene.white - step.visible).max(scene.noise);
+            normal.hold(3, (FAR_ABOVE * seen).powi(-2), scene.white - step.hidden);
+            if let Some((mean, sd)) = blur {
+                normal.hold(1, sd.powi(-2), mean - step.blur);
+            }
+            let solved = normal.solve()?;
+            let moved = solved.unknowns;
+            step = Step {
+                at: step.at + moved[0].clamp(-step.blur, step.blur),
+                blur: (step.blur + moved[1].clamp(-0.3 * step.blur, 0.3 * step.blur))
+                    .max(LEAST_BLUR_PX),
+                visible: step.visible + moved[2],
+                hidden: (step.hidden + moved[3].clamp(-seen, seen)).max(scene.white - seen / 2.0),
+            };
+            let settled = moved[0].abs() < 1e-3 && moved[1].abs() < 1e-3 * step.blur;
+            if settled && k >= WINDOW_STEPS {
+                let covariance = solved.covariance() * misfit.max(1.0);
+                return Found::of(scene, step, &covariance, mean_visible);
+            }
+        }
+        None
+    }
+
+    /// The blur that is expected where a frame alone says so much: that of the
+    /// frames before, as far as the lens is still the same.
+    pub fn expected_blur(&self, alone: &Found) -> Option<(f64, f64)> {
+        let (blur, sd) = self.blur?;
+        let (sd, off) = (sd.hypot(DRIFT * blur), (blur - alone.step.blur).abs());
+        let changed = off > ANOTHER * sd.hypot(alone.blur_sd);
+        Some((blur, if changed { off } else { sd }))
+    }
+
+    /// Keeps a blur for the frames to come.
+    pub fn remember(&mut self, found: &Found) {
+        self.blur = Some((found.step.blur, found.blur_sd));
+    }
+
+    fn mean_visible(&self, hidden_after: bool) -> f64 {
+        let side = usize::from(!hidden_after);
+        let (sum, rows) = self.profiles.iter().fold((0.0, 0.0), |(sum, rows), profile| {
+            (sum + profile.rows * profile.levels[side], rows + profile.rows)
+        });
+        sum / rows
+    }
+
+    /// Normal equations about a step, and the mean square of what it leaves in
+    /// units of the noise.
+    fn linearise(
+        &self,
+        table: &StepTable,
+        scene: &Scene,
+        (from, to): (f64, f64),
+        step: &Step,
+        mean_visible: f64,
+    ) -> (Normal<4>, f64) {
+        let mut normal = Normal::<4>::default();
+        let (mut square, mut n) = (0.0, -4.0);
+        for profile in &self.profiles {
+            let levels = scene.levels(step, mean_visible, profile.levels);
+            for (distance, value) in profile.samples(from, to) {
+                let place = (distance, profile.spread);
+                let Expected { seen, by } = scene.expect(table, step, &levels, place);
+                let (miss, weight) = (value - seen.level, profile.rows / seen.variance);
+                normal.add(by, miss, weight);
+                square += weight * miss * miss;
+                n += 1.0;
+            }
+        }
+        (normal, square / f64::max(n, 1.0))
+    }
+
+    /// Holds the windows of a sheet against a step that lies on a path, and says
+    /// how far each of so many caliper lines is from it. Returns what a window in
+    /// the median leaves, in standard deviations of its noise.
+    pub fn locate(
+        &mut self,
+        table: &StepTable,
+        scene: &Scene,
+        (sheet, path, lines): (&Sheet, &impl Path, usize),
+        found: &Found,
+        mut take: impl FnMut(usize, Option<Line>),
+    ) -> f64 {
+        self.rows.clear();
+        for (number, window) in sheet.windows().iter().enumerate() {
+            let [at, before, step] = path.expected(window.middle);
+            let levels = [f64::from(before), f64::from(before + step)];
+            let levels = scene.levels(&found.step, found.mean_visible, levels);
+            let step = Step { at: f64::from(at), ..found.step };
+            let pixels = (sheet.pixels(number).as_slice(), window);
+            self.rows.push(Row::read(table, scene, pixels, &step, &levels));
+        }
+        let (limit, misfit) = self.limit();
+        let mut first = 0;
+        for line in 0..lines {
+            let rows = &self.rows[first..];
+            let count = rows.iter().take_while(|row| row.line == line).count();
+            take(line, solve(&rows[..count], limit));
+            first += count;
+        }
+        misfit
+    }
+
+    /// Largest misfit of a row that counts, and the median one in units of the
+    /// noise.
+    fn limit(&mut self) -> (f64, f64) {
+        self.sorted.clear();
+        self.sorted.extend(self.rows.iter().map(Row::misfit));
+        let middle = self.sorted.len() / 2;
+        let median = *self.sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let noise = 1.0 + MANY_SIGMA * (2.0 / self.rows[middle].pixels.max(1.0)).sqrt();
+        (noise.max(UNLIKE * median), median.sqrt())
+    }
+}
+
+impl Found {
+    fn of(
+        scene: &Scene,
+        step: Step,
+        covariance: &nalgebra::Matrix4<f64>,
+        mean_visible: f64,
+    ) -> Option<Self> {
+        // What of the place's variance comes with blur and hidden level.
+        let of_place = Vector2::new(covariance[(0, 1)], covariance[(0, 3)]);
+        let of_others = Matrix2::new(
+            covariance[(1, 1)],
+            covariance[(1, 3)],
+            covariance[(1, 3)],
+            covariance[(3, 3)],
+        );
+        let variance = (of_place.transpose() * of_others.try_inverse()? * of_place)[0];
+        let visible_share = (scene.white - step.visible) / (step.hidden - step.visible);
+        let blur_sd = covariance[(1, 1)].sqrt();
+        let found = Self { step, variance, blur_sd, visible_share, mean_visible };
+        (variance.is_finite() && blur_sd.is_finite() && step.blur > 0.0).then_some(found)
+    }
+}
+
+impl Row {
+    /// Reads a window: what it misses, times its derivatives by place and
+    /// visible level.
+    fn read(
+        table: &StepTable,
+        scene: &Scene,
+        (pixels, window): (&[f32], &Window),
+        step: &Step,
+        levels: &Levels,
+    ) -> Self {
+        let (from, to) = scene.window(step);
+        let mut row = Self { line: window.line, ..Self::default() };
+        let count = f64::from(window.rows);
+        let noise = scene.noise / count.sqrt();
+        for (&pixel, place) in pixels.iter().zip(window.first..) {
+            #[expect(clippy::cast_precision_loss, reason = "a place near the gauge")]
+            let place = place as f64;
+            if place < from || place > to {
+                continue;
+            }
+            let Expected { seen, by } = scene.expect(table, step, levels, (place, 0.0));
+            let miss = f64::from(pixel) - seen.level;
+            if miss.abs() > MANY_SIGMA * noise + SLACK_PX * by[0].abs() {
+                row.wild += 1;
+                continue;
+            }
+            let by = Vector2::new(by[0], by[2]);
+            let weight = count / seen.variance;
+            row.matrix += by * by.transpose() * weight;
+            row.vector += by * (miss * weight);
+            row.squares += miss * miss * weight;
+            row.pixels += 1.0;
+        }
+        row
+    }
+
+    /// Mean square of what the row leaves once it is moved, in units of the
+    /// noise.
+    fn misfit(&self) -> f64 {
+        if self.wild > FEW_WILD || self.matrix[(0, 0)] <= 0.0 {
+            return f64::INFINITY;
+        }
+        (self.squares - self.vector[0] * self.vector[0] / self.matrix[(0, 0)]) / self.pixels
+    }
+}
+
+/// Place of a line from its rows.
+fn solve(rows: &[Row], limit: f64) -> Option<Line> {
+    let counts = |row: &&Row| row.misfit() <= limit;
+    let (mut matrix, mut vector, mut n) = (Matrix2::zeros(), Vector2::zeros(), 0.0);
+    for row in rows.iter().filter(counts) {
+        matrix += row.matrix;
+        vector += row.vector;
+        n += 1.0;
+    }
+    #[expect(clippy::cast_precision_loss, reason = "a line has few rows")]
+    let share = n / rows.len() as f64;
+    if share < 0.5 {
+        return None;
+    }
+    let inverse = matrix.try_inverse()?;
+    Some(Line { moved: (inverse * vector)[0], variance: inverse[(0, 0)], share })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::{Frame, Pixels};
+    use crate::geometry::Roi;
+    use crate::time::Stamp;
+    use crate::vision::gauge::Axis;
+    use crate::vision::strip::{Strips, Turner, View};
+
+    const SIZE: (usize, usize) = (120, 40);
+    const LINES: [(usize, usize); 4] = [(0, 10), (10, 20), (20, 30), (30, 40)];
+
+    /// A path that lies off the edge, with the levels that a glance gives.
+    struct Straight {
+        at: f32,
+        levels: [f32; 2],
+    }
+
+    impl Path for Straight {
+        fn expected(&self, _: f32) -> [f32; 3] {
+            [self.at, self.levels[0], self.levels[1] - self.levels[0]]
+        }
+    }
+
+    fn scene(hidden_after: bool) -> Scene {
+        Scene { hidden_after, noise: 4.0, white: 255.0, room: [30.0; 2], shading: 0.0 }
+    }
+
+    /// The mean of what a camera with noise shows of a step, in fine levels.
+    fn sheet(scene: &Scene, step: &Step, path: &Straight) -> Sheet {
+        let table = StepTable::default();
+        let levels = Levels { visible: step.visible, hidden: step.hidden, light: 1.0 };
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "within 16 bits"
+        )]
+        let shown = |x: u16| {
+            let level = scene.expect(&table, step, &levels, (f64::from(x), 0.0)).seen.level;
+            (level * 257.0).round() as u16
+        };
+        let values = (0..40).flat_map(|_| (0..120u16).map(shown)).collect();
+        let frame = Frame::new(0, Stamp::START, SIZE, Pixels::Grey16(values)).unwrap();
+        let view = View::new(Roi { x: 0, y: 0, width: 120, height: 40 }, Axis::Vertical);
+        let mut turner = Turner::default();
+        let Strips::Words(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
+        let mut sheet = Sheet::default();
+        sheet.read(&strip, &LINES, 0.0, |_| path.at);
+        sheet
+    }
+
+    #[test]
+    fn the_flank_tells_place_blur_and_the_hidden_level() {
+        let table = StepTable::default();
+        for hidden_after in [true, false] {
+            let scene = scene(hidden_after);
+            let truth = Step { at: 60.3, blur: 1.6, visible: 175.0, hidden: 300.0 };
+            let levels = if hidden_after { [175.0, 255.0] } else { [255.0, 175.0] };
+            let path = Straight { at: 59.8, levels };
+            let sheet = sheet(&scene, &truth, &path);
+            let mut overlay = Overlay::default();
+            overlay.lay(&sheet, &path);
+            let start = Step { at: 0.0, blur: 1.2, visible: 175.0, hidden: 280.0 };
+            let mut cut_off = CutOff::default();
+            let found = cut_off.fit(&table, &scene, &overlay, (start, None)).unwrap();
+            assert!((found.step.at - 0.5).abs() < 0.005, "{found:?}");
+            assert!((found.step.blur - 1.6).abs() < 0.005, "{found:?}");
+            assert!((found.step.hidden - 300.0).abs() < 0.5, "{found:?}");
+            assert!((found.visible_share - 80.0 / 125.0).abs() < 0.005);
+            // The scatter that 40 rows allow where nothing is known before.
+            assert!((0.10..0.25).contains(&found.variance.sqrt()), "{found:?}");
+            let mut lines = Vec::new();
+            let path = Straight { at: 60.25, ..path };
+            let rows = (&sheet, &path, LINES.len());
+            cut_off.locate(&table, &scene, rows, &found, |_, line| lines.push(line.unwrap()));
+            assert_eq!(lines.len(), 4);
+            assert!(lines.iter().all(|line| (line.moved - 0.05).abs() < 0.006), "{lines:?}");
+        }
+    }
+
+    #[test]
+    fn the_blur_of_frames_before_counts_until_it_is_another() {
+        let found = |blur, blur_sd| Found {
+            step: Step { at: 0.0, blur, visible: 175.0, hidden: 300.0 },
+            variance: 0.01,
+            blur_sd,
+            visible_share: 0.64,
+            mean_visible: 175.0,
+        };
+        let mut cut_off = CutOff::default();
+        assert_eq!(cut_off.expected_blur(&found(1.5, 0.05)), None);
+        cut_off.remember(&found(1.5, 0.01));
+        let (blur, sd) = cut_off.expected_blur(&found(1.55, 0.05)).unwrap();
+        assert_eq!(blur, 1.5);
+        assert!((sd - 0.01_f64.hypot(0.003)).abs() < 1e-12);
+        let (_, sd) = cut_off.expected_blur(&found(2.5, 0.05)).unwrap();
+        assert!((sd - 1.0).abs() < 1e-12);
+    }
+}

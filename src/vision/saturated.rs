@@ -1,0 +1,115 @@
+//! A bead, or the ground beside it, that passes the upper end of the camera's
+//! scale.
+
+use super::noise;
+use super::reject::Reject;
+use super::step::StepTable;
+use super::strip::{Grey, Strip};
+use super::trace::{Scene, Tracer};
+
+/// Share of a step that must lie below the end of the scale.
+const NEED_VISIBLE: f64 = 0.4;
+/// Largest doubt about an edge's place that a hidden level may leave \[px\].
+const MAX_DOUBT_PX: f64 = 0.2;
+/// Ground on either side of the bead that its noise is taken from, and its
+/// distance from the edges \[px\].
+const BESIDE_PX: f32 = 24.0;
+const OFF_EDGE_PX: f32 = 6.0;
+
+/// A bead that was looked at.
+#[derive(Debug, Clone, Copy)]
+pub struct Bead<'a, T> {
+    /// What is looked at, left and right.
+    pub scenes: [Scene<'a, T>; 2],
+    /// Rough places of the left edge, band by band \[px\].
+    pub lefts: &'a [Option<f32>],
+    /// Those of the right edge.
+    pub rights: &'a [Option<f32>],
+}
+
+impl<T: Grey> Bead<'_, T> {
+    /// Traces edges that were looked at, of which these are cut off before or
+    /// after them. Returns the noise of a pixel \[grey levels\].
+    #[cold]
+    pub fn trace(
+        &self,
+        tracers: [&mut Tracer; 2],
+        table: &StepTable,
+        cut_off: [[bool; 2]; 2],
+    ) -> Result<f32, Reject> {
+        let [[_, left_inside], [right_inside, _]] = cut_off;
+        let noise = self.visible_noise(left_inside || right_inside);
+        for ((tracer, scene), cut_off) in tracers.into_iter().zip(self.scenes).zip(cut_off) {
+            let scene = Scene { noise, ..scene };
+            match cut_off {
+                [true, true] => return Err(blinded(0.0)),
+                [false, false] => trace_plainly(tracer, table, &scene)?,
+                [_, hidden_after] => trace_hidden(tracer, table, &scene, hidden_after)?,
+            }
+        }
+        Ok(noise)
+    }
+
+    /// Noise of the side that can be seen: of the bead, or of the ground beside
+    /// it. What is cut off has less.
+    fn visible_noise(&self, bead_is_hidden: bool) -> f32 {
+        let strip = self.scenes[0].strip;
+        let ((left, left_end), (right, right_end)) = (span(self.lefts), span(self.rights));
+        let beside = OFF_EDGE_PX + BESIDE_PX;
+        let ranges = if bead_is_hidden {
+            [(left - beside, left - OFF_EDGE_PX), (right_end + OFF_EDGE_PX, right_end + beside)]
+        } else {
+            [(left_end + OFF_EDGE_PX, right - OFF_EDGE_PX); 2]
+        };
+        let (mut square, mut n) = (0.0, 0.0);
+        for columns in ranges.map(|range| columns(strip, range)) {
+            if !columns.is_empty() {
+                square += noise::of(strip, columns).powi(2);
+                n += 1.0;
+            }
+        }
+        if n > 0.0 { (square / n).sqrt() } else { self.scenes[0].noise }
+    }
+}
+
+fn trace_hidden<T: Grey>(
+    tracer: &mut Tracer,
+    table: &StepTable,
+    scene: &Scene<'_, T>,
+    hidden_after: bool,
+) -> Result<(), Reject> {
+    let found = tracer.trace_cut_off(table, scene, hidden_after).ok_or(blinded(0.0))?;
+    if found.visible_share < NEED_VISIBLE || found.variance.sqrt() > MAX_DOUBT_PX {
+        return Err(blinded(found.visible_share));
+    }
+    Ok(())
+}
+
+/// An edge both sides of which can be seen.
+fn trace_plainly<T: Grey>(
+    tracer: &mut Tracer,
+    table: &StepTable,
+    scene: &Scene<'_, T>,
+) -> Result<(), Reject> {
+    let traced = tracer.blur().is_some_and(|blur| tracer.trace(table, scene, blur));
+    if traced { Ok(()) } else { Err(Reject::NoPair { got: 0.0, need: 1.0 }) }
+}
+
+fn blinded(visible: f64) -> Reject {
+    Reject::Blinded { visible, need: NEED_VISIBLE }
+}
+
+/// Lowest and highest of an edge's places.
+fn span(places: &[Option<f32>]) -> (f32, f32) {
+    let none = (f32::INFINITY, 0.0);
+    places.iter().flatten().fold(none, |(low, high), &at| (low.min(at), f32::max(high, at)))
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "saturates at 0 and is cut to the gauge"
+)]
+fn columns<T: Grey>(strip: &Strip<'_, T>, (from, to): (f32, f32)) -> std::ops::Range<usize> {
+    from as usize..(to as usize).min(strip.across)
+}
