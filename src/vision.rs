@@ -15,7 +15,8 @@
 //!          camera's scale (censor)
 //! refine   the same for edges that are no blurred steps (fit, blur)
 //! outlier  places that disagree with their neighbours
-//! axis     places → width normal to the bead, on the surface (curve, scatter)
+//! axis     places → width normal to the bead, on the surface (curve, scatter,
+//!          waviness)
 //! ```
 //!
 //! The loops over pixels are compiled once for each width of vectors that
@@ -59,6 +60,7 @@ mod step;
 mod strip;
 mod template;
 mod trace;
+mod waviness;
 pub mod width;
 
 pub use gauge::{Axis, Gauge, Method, Polarity};

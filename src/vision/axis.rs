@@ -14,6 +14,7 @@ use super::reject::Reject;
 use super::scatter;
 use super::strip::View;
 use super::trace::Located;
+use super::waviness::{CURVED, Evidence, Midline, ORDERS, legendre, norm};
 use super::width::{Hints, WidthMeasurement};
 
 /// Largest angle between the bead and the gauge's axis that is measured: the
@@ -42,6 +43,15 @@ const NODES: [(f64, f64); 5] = [
 /// Distance of the places from which an edge's direction and bend on the
 /// surface are taken.
 const BESIDE: f64 = 0.15;
+/// Share of the rows from which on nothing but the bead itself is seen.
+const ALL_BUT_FEW: f64 = 0.98;
+/// Inflation of a variance that an edge's misfit may hide, and by how much more
+/// for what it shows: a texture's shift of an edge hangs together over so many
+/// rows.
+const HIDDEN: f64 = 1.2;
+const ALONG: f64 = 15.0;
+/// Squared slopes of an axis, in variances of what waves make, that are none.
+const OBLIQUE: f64 = 3.0;
 
 /// One edge as it was found.
 #[derive(Debug, Clone, Copy)]
@@ -50,6 +60,9 @@ pub struct Side<'a> {
     pub places: &'a [Option<Located>],
     /// Variance of the whole edge's position that all places share \[px²\].
     pub common_variance: f64,
+    /// What a row leaves of the step that it is held against, in standard
+    /// deviations of its noise; infinite where it was not held against one.
+    pub misfit: f64,
 }
 
 /// What a width is taken from.
@@ -104,6 +117,19 @@ pub fn width(
         slant_rad,
         hints,
     })
+}
+
+impl Side<'_> {
+    /// Most that neighbouring places can hang together: what moves an edge,
+    /// unless it is the bead itself, leaves a misfit. Edges that are covered
+    /// here and there may hide anything.
+    fn most_inflation(&self) -> f64 {
+        let seen: f64 = self.places.iter().flatten().map(|located| located.share).sum();
+        if seen < ALL_BUT_FEW * count(self.places.len()) {
+            return f64::INFINITY;
+        }
+        HIDDEN + ALONG * (self.misfit * self.misfit - 1.0).max(0.0)
+    }
 }
 
 impl Scene<'_> {
@@ -167,6 +193,53 @@ impl Scene<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Square of the cosine between the bead and the gauge's axis.
+    fn cosine_squared(&self, curves: &[Curve; 2]) -> f64 {
+        let slope = f64::midpoint(curves[0].slope(0.0), curves[1].slope(0.0)) / self.reach();
+        1.0 / (1.0 + slope * slope)
+    }
+
+    /// How much of the midline's coefficients of the orders 1 to 4 is the
+    /// waviness of the two edges \[px²\]; `None` where there is none to speak
+    /// of. The width's course tells, and of the midline what is no straight or
+    /// evenly bent axis.
+    fn waves(
+        &self,
+        curves: &[Curve; 2],
+        sections: &Sections,
+        memory: &Memory,
+    ) -> Option<[f64; CURVED]> {
+        let mut off = [[0.0; ORDERS]; 2];
+        let mut bands = [0.0f64; 2];
+        for (side, places) in memory.off.iter().enumerate() {
+            for (band, place) in places.iter().enumerate() {
+                let Some(place) = place else { continue };
+                bands[side] += 1.0;
+                for (sum, value) in off[side].iter_mut().zip(legendre(self.place(band))) {
+                    *sum += place * value;
+                }
+            }
+        }
+        let scale = f64::midpoint(sections.scales[0], sections.scales[1]);
+        let per_place = self.sides.iter().map(|side| mean_variance(side.places)).sum::<f64>();
+        let mut evidence = Evidence::default();
+        for order in 1..=ORDERS {
+            let rest = |side: usize| norm(order) * off[side][order - 1] / bands[side].max(1.0);
+            let all = |side: usize| curves[side].coefficient(order) + rest(side);
+            let half_width = 0.5
+                * match order {
+                    1 | 2 => sections.terms[order] / scale + rest(1) - rest(0),
+                    _ => all(1) - all(0),
+                };
+            let noise = norm(order) * per_place / (4.0 * bands[0].min(bands[1]).max(1.0));
+            evidence.add(order, half_width, noise);
+            if order == 3 || order > CURVED {
+                evidence.add(order, f64::midpoint(all(0), all(1)), noise);
+            }
+        }
+        evidence.waves()
     }
 
     fn check_width(&self, got_mm: f64) -> Result<(), Reject> {
@@ -318,6 +391,7 @@ impl Spread {
             let per_place = mean_variance(scene.sides[side].places);
             let off = &memory.off[side];
             let inflation = scatter::inflation(off, per_place, &mut memory.values);
+            let inflation = inflation.min(scene.sides[side].most_inflation());
             let scale = sections.scales[side] * sections.scales[side];
             let of_mean = per_place * inflation * curve.mean_variance;
             variance += scale * (of_mean + scene.sides[side].common_variance);
@@ -325,11 +399,37 @@ impl Spread {
         }
         let roughness = Self::roughness(scene, sections, memory, noise);
         variance += Self::hidden(scene, roughness);
-        let tilt = Self::tilt_variance(scene, curves, memory);
-        variance += sections.oblique * sections.oblique * tilt;
-        let shortened = 0.5 * sections.mean * tilt;
-        variance += 2.0 * shortened * shortened;
-        Self { sigma: variance.sqrt(), shortened, roughness }
+        let (shortened, of_tilt) = Self::tilted(scene, curves, sections, memory);
+        Self { sigma: (variance + of_tilt).sqrt(), shortened, roughness }
+    }
+
+    /// By how much the doubt about the axis' direction makes the width too
+    /// short, and the variance that it leaves.
+    fn tilted(
+        scene: &Scene<'_>,
+        curves: &[Curve; 2],
+        sections: &Sections,
+        memory: &mut Memory,
+    ) -> (f64, f64) {
+        let oblique = sections.oblique * sections.oblique;
+        let Some(waves) = scene.waves(curves, sections, memory) else {
+            let tilt = Self::tilt_variance(scene, curves, memory);
+            let shortened = 0.5 * sections.mean * tilt;
+            return (shortened, oblique * tilt + 2.0 * shortened * shortened);
+        };
+        let midline = Midline::of(curves);
+        let per_slope = scene.cosine_squared(curves) / (scene.reach() * scene.reach());
+        let first = per_slope * scene.cosine_squared(curves) * waves[0];
+        // Bends that waves explain are none of the axis.
+        let (bends, doubt) = midline.bends_of(&waves);
+        let per_bend = 0.5 * sections.mean * per_slope;
+        // Waves make a slope of their own; only what is beyond them is that of
+        // an axis, along which an error of the direction counts.
+        let beyond = (oblique - OBLIQUE * sections.mean * sections.mean * first).max(0.0);
+        let of_slope = 0.5 * sections.mean * first;
+        let of_bends = per_bend * doubt;
+        let variance = beyond * first + of_slope * of_slope + of_bends * of_bends;
+        (of_slope + per_bend * bends, variance)
     }
 
     /// Standard deviation of the width along the gauge, without the noise of
@@ -371,10 +471,7 @@ impl Spread {
         values.extend(both.filter_map(|(left, right)| Some(f64::midpoint((*left)?, (*right)?))));
         let per_place = scatter::correlated_variance(values);
         let slope = f64::midpoint(curves[0].slope_variance, curves[1].slope_variance);
-        let cosine = {
-            let slope = f64::midpoint(curves[0].slope(0.0), curves[1].slope(0.0)) / scene.reach();
-            1.0 / (1.0 + slope * slope)
-        };
+        let cosine = scene.cosine_squared(curves);
         per_place * slope / (scene.reach() * scene.reach()) * cosine * cosine
     }
 }

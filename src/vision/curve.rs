@@ -84,6 +84,12 @@ impl Curve {
         sound.then_some(Self { terms, mean_variance, slope_variance, bend_variance })
     }
 
+    /// Its Legendre coefficient of an order \[px\]; 0 of those that it does not
+    /// have.
+    pub fn coefficient(&self, order: usize) -> f64 {
+        self.terms.get(order).copied().unwrap_or(0.0)
+    }
+
     /// Position at a place \[px\].
     pub fn at(&self, t: f64) -> f64 {
         let values = legendre(t);

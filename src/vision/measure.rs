@@ -399,6 +399,7 @@ impl Work {
         let sides = [&self.left, &self.right].map(|tracer| axis::Side {
             places: tracer.edges(),
             common_variance: tracer.common_variance,
+            misfit: tracer.misfit,
         });
         let (gauge, middles) = (&self.gauge, self.middles.as_slice());
         axis::width(&axis::Scene { view, surface, gauge, middles, sides }, hints, &mut self.axis)

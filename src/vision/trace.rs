@@ -415,6 +415,7 @@ impl Tracer {
         let found = self.refiner.refine(table, &task, scene.bead_after, &mut self.edges, rough);
         self.blur_px = self.refiner.blur_px;
         self.common_variance = 0.0;
+        self.misfit = f64::INFINITY;
         found
     }
 

@@ -1,0 +1,230 @@
+//! How much of a midline's direction and bend is the waviness of its two edges.
+//!
+//! Each edge of a bead waves for itself. What both do together, the midline,
+//! is taken for the bead's axis; what they do against each other changes the
+//! width along the gauge. Both are of one size, so that the width's course, and
+//! what the midline does more often than a bead's axis would, tell how much of
+//! the midline's slope is no slope of the axis.
+
+use std::sync::LazyLock;
+
+use super::curve::Curve;
+
+/// Legendre coefficients that are looked at: of the orders 1 to 8.
+pub const ORDERS: usize = 8;
+/// Orders that a curve has.
+pub const CURVED: usize = 4;
+/// Distances over which waves hang together, in halves of the gauge.
+const LENGTHS: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 2.4];
+/// Variances of a midline's waves: the first, the ratio of one to the next and
+/// their number \[px²\].
+const FIRST_PX2: f64 = 2e-4;
+const RATIO: f64 = 2.0;
+const VARIANCES: usize = 18;
+/// Small waves are likelier than large ones beforehand, by this power of their
+/// variance.
+const SMALL_FIRST: f64 = 0.35;
+/// Points of the gauge for the integrals over it.
+const POINTS: usize = 40;
+/// Evidence that is believed, in standard deviations of what noise makes.
+const BELIEVED: f64 = 4.0;
+/// Standard deviations of what waves make from which on a bend is one of the
+/// bead, and from which on it may be one.
+const SURE_BEND: f64 = 6.0;
+const LIKELY_BEND: f64 = 2.5;
+
+/// Coefficients that tell of waves, by their order.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Evidence {
+    squares: [f64; ORDERS],
+    counts: [f64; ORDERS],
+    noise: [f64; ORDERS],
+}
+
+impl Evidence {
+    /// Adds a coefficient of half the width or of the midline \[px\]; `noise`
+    /// is its variance without waves.
+    pub fn add(&mut self, order: usize, coefficient: f64, noise: f64) {
+        self.squares[order - 1] += coefficient * coefficient;
+        self.counts[order - 1] += 1.0;
+        self.noise[order - 1] = noise;
+    }
+
+    /// Variances that waves give to the midline's coefficients of the orders 1
+    /// to 4 \[px²\]; `None` where noise explains all.
+    pub fn waves(&self) -> Option<[f64; CURVED]> {
+        let (mut ratio, mut n) = (0.0, 0.0);
+        for order in 0..ORDERS {
+            ratio += self.squares[order] / self.noise[order].max(f64::MIN_POSITIVE);
+            n += self.counts[order];
+        }
+        if ratio < n + BELIEVED * f64::sqrt(2.0 * n) {
+            return None;
+        }
+        let mut sum = 0.0;
+        let mut waves = [0.0; CURVED];
+        let mut best = f64::NEG_INFINITY;
+        for shares in SHARES.iter() {
+            let mut variance = FIRST_PX2;
+            for _ in 0..VARIANCES {
+                let likelihood = self.log_likelihood(shares, variance);
+                if likelihood > best {
+                    let fade = (best - likelihood).exp();
+                    sum *= fade;
+                    waves = waves.map(|value| value * fade);
+                    best = likelihood;
+                }
+                let weight = (likelihood - best).exp();
+                sum += weight;
+                for (wave, share) in waves.iter_mut().zip(shares) {
+                    *wave += weight * variance * share;
+                }
+                variance *= RATIO;
+            }
+        }
+        (sum > 0.0).then(|| waves.map(|value| value / sum))
+    }
+
+    /// Logarithm of how likely the coefficients are with waves of some
+    /// variance, and of how likely such waves are.
+    fn log_likelihood(&self, shares: &[f64; ORDERS], variance: f64) -> f64 {
+        let (mut product, mut sum) = (1.0, 0.0);
+        for (order, share) in shares.iter().enumerate() {
+            let expected = variance * share + self.noise[order];
+            sum += self.squares[order] / expected;
+            product *= if self.counts[order] > 1.0 { expected * expected } else { expected };
+        }
+        -0.5 * (product.max(f64::MIN_POSITIVE).ln() + sum) - SMALL_FIRST * variance.ln()
+    }
+}
+
+/// Legendre coefficients of the line midway between two edges, of the orders
+/// 1 to 4 \[px\].
+#[derive(Debug, Clone, Copy)]
+pub struct Midline([f64; CURVED]);
+
+impl Midline {
+    /// Of a left and a right edge.
+    pub fn of([left, right]: &[Curve; 2]) -> Self {
+        Self(std::array::from_fn(|k| {
+            f64::midpoint(left.coefficient(k + 1), right.coefficient(k + 1))
+        }))
+    }
+
+    /// Mean square of the slope.
+    fn square(&self) -> f64 {
+        let [a, b, c, d] = self.0;
+        a * a + 3.0 * b * b + 6.0 * c * c + 10.0 * d * d + 2.0 * a * c + 6.0 * b * d
+    }
+
+    /// Mean square of the slope that comes from bends, as far as waves of these
+    /// variances explain them, and the doubt that leaves where a bead that is
+    /// bent could explain them as well.
+    pub fn bends_of(&self, waves: &[f64; CURVED]) -> (f64, f64) {
+        let beyond = |k: usize, many: f64| self.0[k] * self.0[k] > many * many * waves[k];
+        let mut axis = *self;
+        let mut believed = 0.0;
+        if beyond(2, SURE_BEND) || beyond(3, SURE_BEND) {
+            believed += 6.0 * waves[2] + 10.0 * waves[3];
+        } else {
+            (axis.0[2], axis.0[3]) = (0.0, 0.0);
+        }
+        if beyond(1, SURE_BEND) {
+            believed += 3.0 * waves[1];
+        } else {
+            axis.0[1] = 0.0;
+        }
+        let bends = self.square() - axis.square() + believed;
+        let doubtful = (1..CURVED).any(|k| beyond(k, LIKELY_BEND));
+        (bends, if doubtful { 0.5 * bends } else { 0.0 })
+    }
+}
+
+/// Variance of each coefficient for waves of variance 1, for each length: their
+/// autocorrelation is that of a Matérn process of order 3/2, which has a slope
+/// everywhere but is rougher than a Gaussian one.
+static SHARES: LazyLock<[[f64; ORDERS]; LENGTHS.len()]> = LazyLock::new(|| {
+    LENGTHS.map(|length| {
+        let mut shares = [0.0; ORDERS];
+        for i in 0..POINTS {
+            for j in 0..POINTS {
+                let away = 3f64.sqrt() * (place(i) - place(j)).abs() / length;
+                let alike = (1.0 + away) * (-away).exp();
+                let (a, b) = (legendre(place(i)), legendre(place(j)));
+                for (order, share) in shares.iter_mut().enumerate() {
+                    *share += alike * a[order] * b[order];
+                }
+            }
+        }
+        for (order, share) in shares.iter_mut().enumerate() {
+            *share *= (norm(order + 1) / float(POINTS)).powi(2);
+        }
+        shares
+    })
+});
+
+/// Middle of a piece of the gauge, −1 to 1.
+fn place(piece: usize) -> f64 {
+    (float(2 * piece) + 1.0) / float(POINTS) - 1.0
+}
+
+/// Factor from the mean of values times a Legendre polynomial to its
+/// coefficient.
+pub fn norm(order: usize) -> f64 {
+    float(2 * order + 1)
+}
+
+/// Legendre polynomials of the orders 1 to 8.
+pub fn legendre(t: f64) -> [f64; ORDERS] {
+    let mut values = [t; ORDERS];
+    let (mut before, mut here) = (1.0, t);
+    for (k, value) in values.iter_mut().enumerate().skip(1) {
+        let n = float(k);
+        (before, here) = (here, ((2.0 * n + 1.0) * t * here - n * before) / (n + 1.0));
+        *value = here;
+    }
+    values
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a small number")]
+fn float(number: usize) -> f64 {
+    number as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    #[test]
+    fn polynomials_are_those_of_legendre() {
+        let values = legendre(0.3);
+        assert!((values[1] - (1.5 * 0.09 - 0.5)).abs() < 1e-12);
+        assert!((values[3] - (35.0 * 0.0081 - 30.0 * 0.09 + 3.0) / 8.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn noise_is_no_waves_and_waves_are_found_in_their_size() {
+        let mut random = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(3);
+        let mut normal = |variance: f64| -> f64 {
+            let value: f64 = StandardNormal.sample(&mut random);
+            variance.sqrt() * value
+        };
+        let noise = 1e-4;
+        let (mut found, mut wrong) = (0.0, 0);
+        for _ in 0..400 {
+            let (mut with, mut without) = (Evidence::default(), Evidence::default());
+            for (k, share) in SHARES[5].iter().enumerate() {
+                for _ in 0..2 {
+                    with.add(k + 1, normal(0.25 * share + noise), noise);
+                    without.add(k + 1, normal(noise), noise);
+                }
+            }
+            wrong += usize::from(without.waves().is_some());
+            found += with.waves().unwrap()[0] / (0.25 * SHARES[5][0]) / 400.0;
+        }
+        assert!(wrong <= 4, "{wrong}");
+        assert!((found - 1.0).abs() < 0.3, "{found}");
+    }
+}
