@@ -10,7 +10,8 @@
 //! contour  steps → edges that run along the bead
 //! pair     contours → the two edges of the bead
 //! trace    contour → sub-pixel places, one a caliper line, from all rows:
-//!          path, overlay (blur, surroundings), template, bands
+//!          path, overlay (blur, surroundings), template, bands; texture and
+//!          whiten where the surroundings are not plain
 //! cut_off  the same for edges one side of which passes the end of the
 //!          camera's scale (censor)
 //! refine   the same for edges that are no blurred steps (fit, blur)
@@ -59,8 +60,10 @@ mod sheet;
 mod step;
 mod strip;
 mod template;
+mod texture;
 mod trace;
 mod waviness;
+mod whiten;
 pub mod width;
 
 pub use gauge::{Axis, Gauge, Method, Polarity};

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::line::Line;
 use super::normal::Normal;
-use super::phase::{offset, split};
+use super::phase::split;
 use super::sheet::Sheet;
 use super::step::StepTable;
 
@@ -87,6 +87,32 @@ pub struct Look {
     noise: f64,
     /// How far there is nothing but this edge.
     pub room: Extent,
+}
+
+impl Look {
+    /// Samples beside the edge on either side: distances of the nearest and the
+    /// farthest \[px\].
+    pub fn beside(&self) -> [(usize, usize); 2] {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "within the window"
+        )]
+        let whole = |distance: f64| distance.max(0.0) as usize;
+        let near = 3.0 * self.step.blur + 1.0;
+        let to = |room: f64| whole(room).min(REACH);
+        [
+            (whole((near - self.step.at).ceil()), to(self.room.before)),
+            (whole((near + self.step.at).ceil()), to(self.room.after)),
+        ]
+    }
+
+    /// The same look where texture makes samples less sure than noise does:
+    /// `noise` is what independent ones as unsure would have.
+    pub fn in_texture(self, noise: f64) -> Self {
+        let blur_sd = self.blur_sd * (noise / self.noise).max(1.0);
+        Self { blur_sd, pixel_noise: noise, noise: noise.max(self.noise), ..self }
+    }
 }
 
 /// An edge as the overlay shows it.
@@ -338,6 +364,29 @@ impl Overlay {
     /// Rows that the means are of.
     pub fn used(&self) -> f64 {
         f64::from(self.counts.iter().sum::<f32>())
+    }
+
+    /// Rows that were laid down, and windows.
+    pub fn laid(&self) -> (f64, f64) {
+        #[expect(clippy::cast_precision_loss, reason = "there are few windows")]
+        let windows = self.rows.len() as f64;
+        (self.phases.iter().map(|laid| f64::from(laid.rows)).sum(), windows)
+    }
+
+    /// Variance of a window's samples about the mean near the edge, of the window
+    /// in the median, in squared shares of the step.
+    pub fn unlikeness(&self) -> f64 {
+        #[expect(clippy::cast_precision_loss, reason = "a small number")]
+        let samples = (2 * CORE) as f64;
+        f64::from(self.typical) / samples
+    }
+
+    /// The windows that differ by no more than so many medians of what rows do,
+    /// each with the mean that it is compared with.
+    pub fn rows_like_others(&self, many: f32) -> impl Iterator<Item = (&[f32], &[f32])> {
+        let rows = self.rows.iter().zip(&self.phases).zip(&self.unlike);
+        rows.filter(move |(_, unlike)| **unlike <= many * self.typical)
+            .map(|((row, laid), _)| (row.as_slice(), self.mean[laid.phase].as_slice()))
     }
 
     /// Each sample's distance from the path, its value and its weight.

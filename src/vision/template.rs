@@ -7,6 +7,8 @@ use super::overlay::Shape;
 use super::phase::{offset, split};
 use super::step::StepTable;
 
+pub mod textured;
+
 /// Pixels that are taken together.
 const LANES: usize = 16;
 /// Places between two pixels for which the edge is tabulated.
@@ -20,6 +22,8 @@ const MAX_CHUNKS: usize = 6;
 /// Half the core, in blurs and pixels beside.
 const CORE_BLURS: f64 = 3.5;
 const CORE_BESIDE_PX: f64 = 1.0;
+/// Chunks of the core in textured surroundings, of which nothing is plain.
+const TEXTURED_CORE: usize = 4;
 
 type Chunk = [f32; LANES];
 
@@ -144,11 +148,12 @@ impl Template {
 
     /// Tabulates an edge.
     #[inline(always)]
-    pub fn tabulate(&mut self, table: &StepTable, shape: &Shape) {
+    pub fn tabulate(&mut self, table: &StepTable, shape: &Shape, textured: bool) {
         let half = CORE_BLURS * shape.step.blur + CORE_BESIDE_PX;
-        let core = chunks(2.0 * half).clamp(1, MAX_CORE);
+        let core = chunks(2.0 * half).clamp(if textured { TEXTURED_CORE } else { 1 }, MAX_CORE);
         // A step that goes on beyond the core leaves nothing plain.
-        let plain = if 2.0 * half > float(MAX_CORE * LANES) { 0 } else { MAX_PLAIN };
+        let too_long = 2.0 * half > float(MAX_CORE * LANES);
+        let plain = if textured || too_long { 0 } else { MAX_PLAIN };
         let half = float(core * LANES / 2);
         let before = chunks(shape.extent.before - half).min(plain);
         let after = chunks(shape.extent.after - half).min(plain);

@@ -15,7 +15,10 @@ use super::refine::{Refiner, Task};
 use super::sheet::Sheet;
 use super::step::StepTable;
 use super::strip::{Grey, Strip};
+use super::template::textured::Scatter;
 use super::template::{Expected, PlainSums, RowSums, Template};
+use super::texture::Texture;
+use super::whiten::Whitener;
 
 /// Passes over the rows at most; a second one is made only where the first
 /// path was off by a good part of the blur.
@@ -103,6 +106,9 @@ pub struct Tracer {
     sheet: Sheet,
     overlay: Overlay,
     seen: Option<Look>,
+    texture: Option<Texture>,
+    whitener: Whitener,
+    scatter_in_texture: Option<Scatter>,
     template: Template,
     plain: Vec<PlainSums>,
     sorted: Vec<f32>,
@@ -217,6 +223,7 @@ impl Tracer {
         self.overlay.lay(&self.sheet, &self.course);
         let noise = f64::from(scene.noise) / f64::from(typical(&self.step).abs());
         self.seen = self.overlay.look(table, noise, self.room(scene));
+        self.look_for_texture(scene, noise);
         self.seen.map(|seen| (seen.step.blur, seen.blur_sd))
     }
 
@@ -258,7 +265,7 @@ impl Tracer {
         }
         self.blur_px = shape.step.blur;
         self.common_variance = shape.variance;
-        self.template.tabulate(table, &shape);
+        self.tabulate(table, &shape);
         for _ in 0..MAX_PASSES {
             self.hold(scene);
             self.gather(scene);
@@ -397,6 +404,36 @@ impl Tracer {
         }
     }
 
+    fn look_for_texture<T: Grey>(&mut self, scene: &Scene<'_, T>, noise: f64) {
+        self.texture = None;
+        let Some(seen) = self.seen else { return };
+        let Some(texture) = Texture::read(&self.overlay, noise * noise, seen.beside()) else {
+            return;
+        };
+        let pitch = float(scene.strip.along) / self.overlay.laid().0;
+        self.seen = Some(seen.in_texture(texture.over_area(pitch).sqrt()));
+        self.texture = Some(texture.in_grey(typical(&self.step).into()));
+    }
+
+    /// Makes the template; one that knows the texture where there is some.
+    fn tabulate(&mut self, table: &StepTable, shape: &Shape) {
+        self.scatter_in_texture = None;
+        if let Some(texture) = &self.texture {
+            self.template.tabulate(table, shape, true);
+            self.scatter_in_texture = self.template.whiten(&mut self.whitener, texture);
+        }
+        if self.scatter_in_texture.is_none() {
+            self.texture = None;
+            self.template.tabulate(table, shape, false);
+        }
+    }
+
+    /// Variance of a pixel of the mean of so many rows \[grey levels²\].
+    fn pixel_variance<T: Grey>(&self, scene: &Scene<'_, T>, rows: f32) -> f32 {
+        let texture = self.texture.map_or(0.0, |texture| narrow(texture.of_window()));
+        scene.noise * scene.noise / rows + texture
+    }
+
     /// Locates the edge anew, line by line, where it is not a blurred step.
     /// Returns whether there is one.
     pub fn refine<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
@@ -523,7 +560,8 @@ impl Tracer {
                 continue;
             }
             let [path, before, step] = self.course.at(window.middle);
-            let expected = self.expected([path, before, step], scene.noise, weight);
+            let noise = self.pixel_variance(scene, weight).sqrt();
+            let expected = Self::expected([path, before, step], noise);
             let pixels = (self.sheet.pixels(number).as_slice(), window.first);
             let sums = self.template.hold(pixels, &expected, &mut self.plain[band]);
             let sums = sums.unwrap_or(RowSums::OUT_OF_SIGHT);
@@ -534,10 +572,10 @@ impl Tracer {
         }
     }
 
-    /// What the mean of some rows is held against.
+    /// What the mean of some rows is held against, whose pixels have a noise.
     #[inline(always)]
-    fn expected(&self, [path, before, step]: [f32; 3], noise: f32, weight: f32) -> Expected {
-        let noise = MANY_SIGMA * noise / weight.sqrt();
+    fn expected([path, before, step]: [f32; 3], noise: f32) -> Expected {
+        let noise = MANY_SIGMA * noise;
         Expected {
             at: Template::sampled(path),
             before,
@@ -553,6 +591,10 @@ impl Tracer {
     fn misfit(&self, sums: &RowSums, weight: f32) -> f32 {
         if sums.wild > FEW_WILD {
             return f32::INFINITY;
+        }
+        // Weights that know a texture are not the slope of the step.
+        if self.texture.is_some() {
+            return weight * sums.squares;
         }
         let stiffness = narrow(self.template.products.slope_slope);
         weight * (sums.squares - sums.slope * sums.slope / stiffness)
@@ -575,9 +617,12 @@ impl Tracer {
         let middle = self.sorted.len() / 2;
         let median = *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
         let pixels = narrow(products.pixels);
-        let noise = scene.noise * scene.noise * (pixels + MANY_SIGMA * (2.0 * pixels).sqrt());
-        let limit = noise.max(UNLIKE * median);
-        self.misfit = f64::from(median / (scene.noise * scene.noise * pixels)).sqrt();
+        let together = self.groups.iter().fold(1.0, |most: f32, group| most.max(group.weight));
+        let variance = together * self.pixel_variance(scene, together);
+        let alike = self.texture.map_or(1.0, |texture| narrow(texture.pixels_alike()));
+        let limit = variance * (pixels + MANY_SIGMA * (2.0 * pixels * alike).sqrt());
+        let limit = limit.max(UNLIKE * median);
+        self.misfit = f64::from(median / (variance * pixels)).sqrt();
         let covered =
             |group: &&Group| group.misfit > UNFIT * limit || group.misfit == f32::INFINITY;
         let unfit = self.groups.iter().filter(covered).count();
@@ -627,7 +672,10 @@ impl Tracer {
         let fitting = groups.iter().filter(|group| group.misfit <= limit);
         self.sorted.extend(fitting.map(|group| group.moved));
         let typical = median_of_few(&mut self.sorted);
-        let noise = MANY_SIGMA * scene.noise / (step.abs() * stiffness.sqrt());
+        let in_texture = self.scatter_in_texture.map(|scatter| narrow(scatter.of_window));
+        let of_window = |weight: f32| {
+            in_texture.unwrap_or(scene.noise * scene.noise / (weight * stiffness)).sqrt()
+        };
         let widen = |(count, sum): (f32, f32)| (f64::from(count), f64::from(sum));
         let mut sums = BandSums {
             step: step.into(),
@@ -636,7 +684,7 @@ impl Tracer {
             ..BandSums::default()
         };
         for group in groups {
-            let far = noise / group.weight.sqrt() + WAVY_PX;
+            let far = MANY_SIGMA * of_window(group.weight) / step.abs() + WAVY_PX;
             let counts = group.misfit <= limit && (group.moved - typical).abs() <= far;
             sums.all_rows += f64::from(group.weight);
             if self.clear.is_empty() || group.misfit < f32::INFINITY {
@@ -656,17 +704,21 @@ impl Tracer {
     /// Solves every band; returns whether the path was near enough for that.
     #[inline(always)]
     fn locate<T: Grey>(&mut self, scene: &Scene<'_, T>, blur: f64) -> bool {
-        let variance = f64::from(scene.noise).powi(2);
+        let variance = match self.scatter_in_texture {
+            Some(scatter) => scatter.of_mean,
+            None => f64::from(scene.noise).powi(2),
+        };
         let core = self.template.products.matrix();
         let extra = [0, 1].map(|side| self.extra_variance(core, variance, side));
         let plain = self.template.plain_pixels();
         let least_share = if self.clear.is_empty() { LEAST_SHARE } else { LEAST_CLEAR_SHARE };
         self.edges.clear();
+        let textured = self.texture.is_some();
         let mut off: f64 = 0.0;
         for (band, sums) in self.solved.iter().enumerate() {
             let located =
                 sums.solve(core, variance, extra, plain, least_share).map(|(moved, located)| {
-                    let bent = moved / blur;
+                    let bent = if textured { 0.0 } else { moved / blur };
                     let moved = moved * (1.0 + bent * bent / 12.0);
                     off = off.max(moved.abs());
                     let [path, _, _] = self.course.at(narrow(pool::middle(scene.lines[band])));
@@ -687,6 +739,11 @@ impl Tracer {
         let places = self.edges.iter().map(|edge| edge.map(|edge| narrow(edge.at)));
         path::fill(places, &mut self.rough);
         path::median_of_three(&mut self.rough);
+        if self.texture.is_some() {
+            // What the texture makes of a place is no path.
+            path::smooth(&self.rough, &mut self.sorted);
+            std::mem::swap(&mut self.rough, &mut self.sorted);
+        }
         self.course.redraw(scene.lines, &self.rough, &mut self.memory);
         self.read(scene);
     }

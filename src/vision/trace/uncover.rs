@@ -56,6 +56,8 @@ impl Tracer {
     #[inline(always)]
     pub(super) fn uncover<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
         self.sort_rows = true;
+        self.texture = None;
+        self.scatter_in_texture = None;
         self.free.clear();
         self.free.extend_from_slice(&self.picked);
         let mut best = (NONE_CLEAR, 0);
@@ -85,7 +87,7 @@ impl Tracer {
             }
         }
         let Some(shape) = self.read_shape(table, scene) else { return false };
-        self.template.tabulate(table, &shape);
+        self.template.tabulate(table, &shape, false);
         self.blur_px = shape.step.blur;
         self.common_variance = shape.variance;
         self.hold(scene);
@@ -108,7 +110,7 @@ impl Tracer {
         self.overlay.settle(&self.sheet, &self.course, clear);
         for _ in 0..PASSES {
             let shape = self.read_shape(table, scene)?;
-            self.template.tabulate(table, &shape);
+            self.template.tabulate(table, &shape, false);
             self.clear.clear();
             self.hold(scene);
             if !self.judge_rows(scene, shape.step.blur) {
@@ -267,7 +269,8 @@ impl Tracer {
                 run = 0.0;
                 continue;
             }
-            let expected = self.expected([at, before, step], scene.noise, group.weight);
+            let noise = scene.noise / group.weight.sqrt();
+            let expected = Self::expected([at, before, step], noise);
             let mut plain = PlainSums::default();
             let pixels = (self.sheet.pixels(number).as_slice(), window.first);
             let sums = self.template.hold(pixels, &expected, &mut plain);

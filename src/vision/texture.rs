@@ -1,0 +1,349 @@
+//! Texture of bead and ground, a random pattern that hangs together over a few
+//! pixels: whether there is one in the rows laid over each other, how strong it
+//! is and how far it reaches.
+
+use std::sync::LazyLock;
+
+use super::overlay::Overlay;
+
+/// Variance of the rows about an edge, in that of their noise, from which on
+/// they are looked at for texture.
+const NOTABLE: f64 = 1.25;
+/// Rows differ more about the edge than beside it where the edge is no blurred
+/// step or does not lie where it is thought; by more than so many times, and it
+/// is not texture that makes them differ.
+const AT_EDGE: f64 = 1.6;
+/// Least variance of a texture, in that of the noise.
+const LEAST: f64 = 0.1;
+/// Samples beyond so many standard deviations are grains and sparks.
+const MANY_SIGMA: f64 = 4.0;
+/// Rows that differ by so many medians of what rows do have one on them.
+const UNLIKE: f32 = 4.0;
+/// Distances at which samples are compared \[px\], up to.
+const LAGS: usize = 8;
+/// Samples of a side that are needed for that.
+const LEAST_ROOM: usize = 2 * LAGS;
+/// Longest stretch of a row on one side of the edge \[px\].
+const MOST_ROOM: usize = 40;
+
+/// Autocorrelations exp(−(r/length)^power) that are tried.
+const POWERS: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
+const LENGTHS: usize = 30;
+const FIRST_LENGTH_PX: f64 = 0.7;
+const LENGTH_RATIO: f64 = 1.12;
+/// Rows of a window at most; more are taken for so many.
+const MOST_ROWS: usize = 8;
+/// Table of their integrals along the edge: places for a length, lengths.
+const PER_LENGTH: usize = 8;
+const REACH: usize = 12;
+
+/// Texture and noise about an edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Texture {
+    /// Variance of the noise, which every pixel has for itself.
+    pub noise: f64,
+    /// Variance of the texture.
+    variance: f64,
+    /// Distance over which it hangs together \[px\].
+    length: f64,
+    /// Which of [`POWERS`] its autocorrelation has.
+    power: usize,
+    /// Rows of a window, and the share of the texture that is left of it in
+    /// their mean.
+    rows: f64,
+    kept: f64,
+}
+
+impl Texture {
+    /// Reads it from windows laid over each other, `None` where there is no
+    /// texture to speak of. `noise` is the variance of a pixel, all variances
+    /// are in squared shares of the step; `beside` are the stretches that are
+    /// free of the edge: nearest and farthest distance before it and after it
+    /// \[px\].
+    #[inline(always)]
+    pub fn read(overlay: &Overlay, noise: f64, beside: [(usize, usize); 2]) -> Option<Self> {
+        let (rows, windows) = overlay.laid();
+        let rows = rows / windows.max(1.0);
+        let about_edge = rows * overlay.unlikeness();
+        if about_edge < NOTABLE * noise {
+            return None;
+        }
+        Self::find(overlay, (rows, about_edge), noise, beside)
+    }
+
+    fn find(
+        overlay: &Overlay,
+        (rows, about_edge): (f64, f64),
+        noise: f64,
+        beside: [(usize, usize); 2],
+    ) -> Option<Self> {
+        let all = covariances(overlay, beside, MANY_SIGMA * (about_edge / rows).sqrt())?;
+        if rows * all[0] < (1.0 + LEAST) * noise || about_edge > AT_EDGE * rows * all[0] {
+            return None;
+        }
+        let Fit { power, length, variance, kept } = TABLES.fit(&all, rows);
+        // What neighbouring rows differ by, as noise is found, has a little of
+        // the texture in it.
+        let noise = (rows * (all[0] - kept * variance)).clamp(0.25 * noise, 1.1 * noise);
+        let texture = Self { noise, variance, length, power, rows, kept };
+        (rows * kept * variance > LEAST * noise).then_some(texture)
+    }
+
+    /// With grey levels instead of shares of a step.
+    pub fn in_grey(self, step: f64) -> Self {
+        let square = step * step;
+        Self { noise: square * self.noise, variance: square * self.variance, ..self }
+    }
+
+    /// Variance of the mean of a window's rows, without noise.
+    pub fn of_window(&self) -> f64 {
+        self.kept * self.variance
+    }
+
+    /// Variance of the noise in it.
+    pub fn noise_of_window(&self) -> f64 {
+        self.noise / self.rows
+    }
+
+    /// Covariance of pixels of the same window at a distance \[px\], without
+    /// noise.
+    pub fn within_window(&self, distance: f64) -> f64 {
+        self.of_window() * correlation(distance / self.length, POWERS[self.power])
+    }
+
+    /// Covariance of the means over many rows at a distance across, times the
+    /// number of rows, without noise.
+    pub fn over_rows(&self, distance: f64) -> f64 {
+        self.variance * self.length * TABLES.along(self.power, distance / self.length)
+    }
+
+    /// Variance of the mean over a large area, times the number of its pixels,
+    /// where of the rows only every so many-th is seen.
+    pub fn over_area(&self, pitch: f64) -> f64 {
+        // The integral of a texture over an area, for the powers from 1 to 2.
+        let area = std::f64::consts::PI * self.length * self.length * 2.0 / POWERS[self.power];
+        self.noise + self.variance * (area / pitch.max(1.0)).max(self.length)
+    }
+
+    /// Squared correlation of pixels, summed up over a window: so many of them
+    /// say of its strength what one alone does.
+    pub fn pixels_alike(&self) -> f64 {
+        let all = self.of_window() + self.noise_of_window();
+        let shared = |lag: usize| (self.within_window(float(lag)) / all).powi(2);
+        (1..=LAGS).fold(1.0, |sum, lag| sum + 2.0 * shared(lag))
+    }
+}
+
+/// Covariances of samples of a row at distances of 0 to [`LAGS`] pixels, over
+/// all rows but those with a grain; `None` where there is too little room.
+fn covariances(
+    overlay: &Overlay,
+    beside: [(usize, usize); 2],
+    limit: f64,
+) -> Option<[f64; LAGS + 1]> {
+    let mut sums = [0.0; LAGS + 1];
+    let mut counts = [0.0; LAGS + 1];
+    #[expect(clippy::cast_possible_truncation, reason = "a share of a step")]
+    let limit = limit as f32;
+    for (before, (near, far)) in [true, false].into_iter().zip(beside) {
+        let length = far.saturating_sub(near).min(MOST_ROOM);
+        if length < LEAST_ROOM {
+            continue;
+        }
+        let mut off = [0.0f32; MOST_ROOM];
+        for (row, mean) in overlay.rows_like_others(UNLIKE) {
+            let centre = row.len() / 2;
+            let first = if before { centre - near - length } else { centre + near };
+            let both = row[first..first + length].iter().zip(&mean[first..first + length]);
+            for (off, (sample, mean)) in off.iter_mut().zip(both) {
+                *off = (sample - mean).clamp(-limit, limit);
+            }
+            for (lag, (sum, count)) in sums.iter_mut().zip(&mut counts).enumerate() {
+                *sum += f64::from(product(&off[..length - lag], &off[lag..length]));
+                *count += float(length - lag);
+            }
+        }
+    }
+    if counts[0] == 0.0 {
+        return None;
+    }
+    // The mean that is taken off has some of every window in it.
+    let (_, windows) = overlay.laid();
+    let share = windows / (windows - 1.0).max(1.0);
+    for (sum, count) in sums.iter_mut().zip(counts) {
+        *sum *= share / count;
+    }
+    Some(sums)
+}
+
+#[inline(always)]
+fn product(a: &[f32], b: &[f32]) -> f32 {
+    let mut lanes = [0.0f32; 8];
+    let (a_parts, b_parts) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest = a_parts.remainder().iter().zip(b_parts.remainder());
+    let rest: f32 = rest.map(|(a, b)| a * b).sum();
+    for (a, b) in a_parts.zip(b_parts) {
+        for k in 0..8 {
+            lanes[k] += a[k] * b[k];
+        }
+    }
+    rest + lanes.iter().sum::<f32>()
+}
+
+/// Autocorrelation at a distance in lengths.
+fn correlation(distance: f64, power: f64) -> f64 {
+    (-distance.powf(power)).exp()
+}
+
+/// What a texture is like.
+struct Fit {
+    power: usize,
+    length: f64,
+    variance: f64,
+    kept: f64,
+}
+
+/// Covariances of windows at distances of 0 to [`LAGS`], for each power and
+/// length.
+type OfWindows = [[[f64; LAGS + 1]; LENGTHS]; POWERS.len()];
+
+/// Covariances of windows of each number of rows, and for each power sums along
+/// the edge.
+struct Tables {
+    windows: Vec<OfWindows>,
+    integrals: [[f64; REACH * PER_LENGTH + 1]; POWERS.len()],
+}
+
+static TABLES: LazyLock<Tables> = LazyLock::new(Tables::new);
+
+impl Tables {
+    fn new() -> Self {
+        Self {
+            windows: (1..=MOST_ROWS).map(of_windows).collect(),
+            integrals: POWERS.map(sums_along),
+        }
+    }
+
+    /// What texture explains the covariances of windows of so many rows best.
+    /// Those of pixels with themselves have noise in them and are passed over.
+    fn fit(&self, covariances: &[f64; LAGS + 1], rows: f64) -> Fit {
+        let rows = rows.clamp(1.0, float(MOST_ROWS));
+        let fewer = (1..MOST_ROWS).rfind(|&few| float(few) <= rows).unwrap_or(1);
+        let share = rows - float(fewer);
+        let (fewer, more) = (&self.windows[fewer - 1], &self.windows[fewer.min(MOST_ROWS - 1)]);
+        let mut best = 0.0;
+        let mut fit = Fit { power: 0, length: FIRST_LENGTH_PX, variance: 0.0, kept: 1.0 };
+        for (power, (fewer, more)) in fewer.iter().zip(more).enumerate() {
+            for (number, (fewer, more)) in fewer.iter().zip(more).enumerate() {
+                let model = |lag: usize| fewer[lag] + share * (more[lag] - fewer[lag]);
+                let (mut product, mut square) = (0.0, 0.0);
+                for (lag, found) in covariances.iter().enumerate().skip(1) {
+                    let model = model(lag);
+                    product += model * found / float(lag);
+                    square += model * model / float(lag);
+                }
+                let explained = product * product.max(0.0) / square;
+                if explained > best {
+                    best = explained;
+                    let (length, variance) = (length(number), product / square);
+                    fit = Fit { power, length, variance, kept: model(0) };
+                }
+            }
+        }
+        fit
+    }
+
+    /// Autocorrelation of a texture of length 1 at a distance across, summed up
+    /// along the edge.
+    fn along(&self, power: usize, distance: f64) -> f64 {
+        let place = distance * float(PER_LENGTH);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a distance is positive, and what is too large is beyond the table"
+        )]
+        let below = place as usize;
+        let values = &self.integrals[power];
+        let (Some(here), Some(next)) = (values.get(below), values.get(below + 1)) else {
+            return 0.0;
+        };
+        here + (place - float(below)) * (next - here)
+    }
+}
+
+fn of_windows(rows: usize) -> OfWindows {
+    POWERS.map(|power| {
+        std::array::from_fn(|number| {
+            std::array::from_fn(|lag| {
+                let distance = |apart: usize| float(lag).hypot(float(apart)) / length(number);
+                let along: [f64; MOST_ROWS] =
+                    std::array::from_fn(|apart| correlation(distance(apart), power));
+                mean_of_pairs(&along[..rows])
+            })
+        })
+    })
+}
+
+/// Autocorrelation of a texture of length 1 summed up along the edge, at
+/// distances across.
+fn sums_along(power: f64) -> [f64; REACH * PER_LENGTH + 1] {
+    let step = 1.0 / float(PER_LENGTH);
+    std::array::from_fn(|place| {
+        let across = step * float(place);
+        let at = |k: usize| correlation(across.hypot(step * float(k)), power);
+        step * (1..REACH * PER_LENGTH).fold(at(0), |sum, k| sum + 2.0 * at(k))
+    })
+}
+
+/// Mean over all pairs of neighbouring rows of what depends on their distance.
+fn mean_of_pairs(by_distance: &[f64]) -> f64 {
+    let rows = by_distance.len();
+    let pairs = by_distance.iter().enumerate().map(|(apart, value)| {
+        let pairs = if apart == 0 { rows } else { 2 * (rows - apart) };
+        float(pairs) * value
+    });
+    pairs.sum::<f64>() / float(rows * rows)
+}
+
+/// The lengths that are tried \[px\].
+fn length(number: usize) -> f64 {
+    FIRST_LENGTH_PX * LENGTH_RATIO.powf(float(number))
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a small number")]
+fn float(number: usize) -> f64 {
+    number as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn covariances_tell_strength_length_and_shape() {
+        for (power, wanted, rows) in [(0, 4.0, 1), (2, 3.0, 3), (4, 5.5, 6)] {
+            let mut covariances = [0.0; LAGS + 1];
+            for (lag, value) in covariances.iter_mut().enumerate() {
+                let at = |apart: usize| float(lag).hypot(float(apart)) / wanted;
+                let along: Vec<f64> =
+                    (0..rows).map(|apart| 3.0 * correlation(at(apart), POWERS[power])).collect();
+                *value = mean_of_pairs(&along);
+            }
+            let fit = TABLES.fit(&covariances, float(rows));
+            assert_eq!(fit.power, power);
+            assert!((fit.length / wanted - 1.0).abs() < 0.07, "{}", fit.length);
+            assert!((fit.variance / 3.0 - 1.0).abs() < 0.1, "{}", fit.variance);
+        }
+    }
+
+    #[test]
+    fn sums_along_the_edge_are_those_of_a_gaussian() {
+        let texture =
+            Texture { noise: 1.0, variance: 4.0, length: 4.0, power: 4, rows: 1.0, kept: 1.0 };
+        for distance in [0.0, 1.3, 5.0, 60.0] {
+            let expected =
+                16.0 * std::f64::consts::PI.sqrt() * libm::exp(-distance * distance / 16.0);
+            assert!((texture.over_rows(distance) - expected).abs() < 0.1, "{distance}");
+        }
+    }
+}

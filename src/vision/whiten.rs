@@ -1,0 +1,154 @@
+//! Weights of the pixels of a row for the place of an edge in noise that hangs
+//! together over neighbours: those of generalised least squares, blind to the
+//! levels on either side.
+
+/// Pixels at most.
+pub const MOST: usize = 64;
+
+/// Finds weights; keeps its memory from frame to frame.
+#[derive(Debug, Clone)]
+pub struct Whitener {
+    /// Lower triangle L of the covariances' Cholesky factors, row by row, with
+    /// the reciprocal of the diagonal.
+    rows: Vec<[f64; MOST]>,
+    count: usize,
+    level: [f64; MOST],
+}
+
+impl Default for Whitener {
+    fn default() -> Self {
+        Self { rows: vec![[0.0; MOST]; MOST], count: 0, level: [1.0; MOST] }
+    }
+}
+
+impl Whitener {
+    /// Takes the covariances of pixels at distances of 0, 1, … Returns whether
+    /// they can be ones.
+    pub fn prepare(&mut self, count: usize, covariance: impl Fn(usize) -> f64) -> bool {
+        self.count = count.min(MOST);
+        let mut by_distance = [0.0; MOST];
+        for (distance, value) in by_distance[..self.count].iter_mut().enumerate() {
+            *value = covariance(distance);
+        }
+        for i in 0..self.count {
+            let (done, rest) = self.rows.split_at_mut(i);
+            let row = &mut rest[0];
+            for (j, other) in done.iter().enumerate() {
+                row[j] = (by_distance[i - j] - product(&row[..j], &other[..j])) * other[j];
+            }
+            let square = by_distance[0] - product(&row[..i], &row[..i]);
+            if square <= 1e-6 * by_distance[0] {
+                return false;
+            }
+            row[i] = 1.0 / square.sqrt();
+        }
+        self.level = [1.0; MOST];
+        let mut level = self.level;
+        self.whiten(&mut level);
+        self.level = level;
+        true
+    }
+
+    /// Replaces the slope of a step by the weights of its place, so that their
+    /// product with the slope is 1 and those with the shares after and before
+    /// the step are 0; returns the variance that they leave to the place.
+    pub fn weights(&self, slope: &mut [f64; MOST], after: &[f64; MOST]) -> Option<f64> {
+        let n = self.count;
+        let mut after = *after;
+        self.whiten(slope);
+        self.whiten(&mut after);
+        let level = &self.level[..n];
+        take_off(&mut after[..n], level);
+        take_off(&mut slope[..n], level);
+        take_off(&mut slope[..n], &after[..n]);
+        let square = product(&slope[..n], &slope[..n]);
+        if square <= 0.0 {
+            return None;
+        }
+        for value in &mut slope[..n] {
+            *value /= square;
+        }
+        self.whiten_back(slope);
+        Some(1.0 / square)
+    }
+
+    /// L⁻¹ times a vector.
+    fn whiten(&self, values: &mut [f64; MOST]) {
+        for (i, row) in self.rows[..self.count].iter().enumerate() {
+            values[i] = (values[i] - product(&row[..i], &values[..i])) * row[i];
+        }
+    }
+
+    /// L⁻ᵀ times a vector.
+    fn whiten_back(&self, values: &mut [f64; MOST]) {
+        for i in (0..self.count).rev() {
+            let row = &self.rows[i];
+            let value = values[i] * row[i];
+            values[i] = value;
+            for (other, weight) in values[..i].iter_mut().zip(&row[..i]) {
+                *other -= weight * value;
+            }
+        }
+    }
+}
+
+/// Makes values orthogonal to others.
+fn take_off(values: &mut [f64], others: &[f64]) {
+    let share = product(values, others) / product(others, others).max(f64::MIN_POSITIVE);
+    for (value, other) in values.iter_mut().zip(others) {
+        *value -= share * other;
+    }
+}
+
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    let mut lanes = [0.0; 4];
+    let (a_parts, b_parts) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest = a_parts.remainder().iter().zip(b_parts.remainder());
+    let rest: f64 = rest.map(|(a, b)| a * b).sum();
+    for (a, b) in a_parts.zip(b_parts) {
+        for k in 0..4 {
+            lanes[k] += a[k] * b[k];
+        }
+    }
+    rest + (lanes[0] + lanes[2]) + (lanes[1] + lanes[3])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    #[test]
+    fn weights_are_those_of_generalised_least_squares() {
+        let n = 24;
+        let covariance = |d: usize| {
+            let d = f64::from(u32::try_from(d).unwrap());
+            7.0 * libm::exp(-d * d / 16.0) + if d == 0.0 { 1.0 } else { 0.0 }
+        };
+        let table = crate::vision::step::StepTable::default();
+        let (mut slope, mut after) = ([0.0; MOST], [0.0; MOST]);
+        for k in 0..n {
+            let z = (f64::from(u32::try_from(k).unwrap()) - 11.3) / 1.5;
+            let (step, density) = table.at(z);
+            (after[k], slope[k]) = (step, density / 1.5);
+        }
+        let matrix = DMatrix::from_fn(n, n, |i, j| covariance(i.abs_diff(j)));
+        let design = DMatrix::from_fn(n, 3, |i, j| [slope[i], 1.0 - after[i], after[i]][j]);
+        let whitened = matrix.clone().cholesky().unwrap().solve(&design);
+        let inverse = (design.transpose() * &whitened).try_inverse().unwrap();
+        let expected: DVector<f64> = whitened * inverse.column(0);
+
+        let mut whitener = Whitener::default();
+        assert!(whitener.prepare(n, covariance));
+        let variance = whitener.weights(&mut slope, &after).unwrap();
+        assert!((variance / inverse[(0, 0)] - 1.0).abs() < 1e-9);
+        for k in 0..n {
+            assert!((slope[k] - expected[k]).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_covariances_is_told() {
+        assert!(!Whitener::default().prepare(8, |d| if d < 4 { 1.0 } else { 0.0 }));
+    }
+}
