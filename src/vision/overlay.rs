@@ -14,7 +14,7 @@ use super::step::StepTable;
 /// Rows that are laid over each other at most.
 const ROWS: usize = 100;
 /// Farthest sample from the edge on either side \[px\].
-pub const REACH: usize = 40;
+pub const REACH: usize = 48;
 const SPAN: usize = 2 * REACH;
 /// Rows are laid down at the nearest of so many places between pixels.
 const PHASES: usize = 2;

@@ -153,7 +153,8 @@ impl Template {
         let core = chunks(2.0 * half).clamp(if textured { TEXTURED_CORE } else { 1 }, MAX_CORE);
         // A step that goes on beyond the core leaves nothing plain.
         let too_long = 2.0 * half > float(MAX_CORE * LANES);
-        let plain = if textured || too_long { 0 } else { MAX_PLAIN };
+        let room = MAX_CHUNKS.saturating_sub(core) / 2;
+        let plain = if textured || too_long { 0 } else { room.min(MAX_PLAIN) };
         let half = float(core * LANES / 2);
         let before = chunks(shape.extent.before - half).min(plain);
         let after = chunks(shape.extent.after - half).min(plain);
