@@ -109,6 +109,6 @@ fn curves_keep_to_the_grid_that_they_are_drawn_on() {
         assert!(!every_svg || !properties.contains("width"), "{rule}");
     }
     let outer = page.matches("<svg viewBox").count();
-    assert_eq!(outer, page.matches("role=\"img\"").count());
+    assert_eq!(outer, page.matches("\" role=\"img\"").count());
     assert!(page.contains("svg[role=\"img\"] {"));
 }
