@@ -450,7 +450,7 @@ mod tests {
         let mut turner = Turner::default();
         let Strips::Words(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
         let mut sheet = Sheet::default();
-        sheet.read(&strip, &LINES, 0.0, |_| path.at);
+        sheet.read(&strip, &LINES, (0.0, 1), |_| path.at);
         sheet
     }
 

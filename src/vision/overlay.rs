@@ -481,7 +481,7 @@ impl Overlay {
             let weight = self.counts[usize::from(phase.unsigned_abs())];
             // The nearest sample, of two as near the one farther out.
             let twice = half + phase;
-            let k = (twice + twice.signum()) / 2 + middle;
+            let k = i16::midpoint(twice, twice.signum()) + middle;
             let k = usize::try_from(k).unwrap_or(0).clamp(1, SPAN - 2);
             sum += weight * 0.5 * (mean[k + 1] - mean[k - 1]);
             n += weight;

@@ -832,18 +832,20 @@ impl BandSums {
 /// Solves symmetric equations for place and levels, the levels first; the
 /// variance is that of the place.
 fn solve(matrix: &Matrix3<f64>, vector: &Vector3<f64>) -> Option<([f64; 3], f64)> {
-    let (a, b, c) = (matrix[(1, 1)], matrix[(2, 1)], matrix[(2, 2)]);
-    let determinant = a * c - b * b;
-    let (p, q) = (matrix[(1, 0)], matrix[(2, 0)]);
-    // What a shift by 1 does to the levels, times the determinant.
-    let (before, after) = (c * p - b * q, a * q - b * p);
-    let stiffness = matrix[(0, 0)] * determinant - (p * before + q * after);
+    let (before, both, after) = (matrix[(1, 1)], matrix[(2, 1)], matrix[(2, 2)]);
+    let determinant = before * after - both * both;
+    let with = [matrix[(1, 0)], matrix[(2, 0)]];
+    // What two sums do to the levels, times the determinant.
+    let levels =
+        |sums: [f64; 2]| [after * sums[0] - both * sums[1], before * sums[1] - both * sums[0]];
+    let shift = levels(with);
+    let stiffness = matrix[(0, 0)] * determinant - (with[0] * shift[0] + with[1] * shift[1]);
     if determinant <= 0.0 || stiffness <= 0.0 {
         return None;
     }
-    let place = (vector[0] * determinant - vector[1] * before - vector[2] * after) / stiffness;
-    let (x, y) = (vector[1] - p * place, vector[2] - q * place);
-    let levels = [(c * x - b * y) / determinant, (a * y - b * x) / determinant];
+    let place = (vector[0] * determinant - vector[1] * shift[0] - vector[2] * shift[1]) / stiffness;
+    let levels = levels([vector[1] - with[0] * place, vector[2] - with[1] * place])
+        .map(|level| level / determinant);
     Some(([place, levels[0], levels[1]], determinant / stiffness))
 }
 
