@@ -43,6 +43,9 @@ const VERY_STRANGE: f64 = 8.0;
 /// of one that many rows agree on, and of one that was fitted for itself.
 const OFF_PX: f64 = 0.3;
 const LINE_OFF_PX: f64 = 0.75;
+/// Largest standard deviation of a width whose edges are covered in part
+/// \[px\]: beyond it, what is left of an edge does not tell its course.
+const COVERED_SIGMA_PX: f64 = 0.22;
 /// Ground on either side of the bead that its noise is taken from \[px\].
 const BESIDE_PX: f32 = 12.0;
 /// Share by which the blur of one edge differs from the other's.
@@ -72,6 +75,7 @@ struct Work {
     bands: Bands,
     lines: Vec<(usize, usize)>,
     noise: f32,
+    width_px: f32,
     memory: Vec<f32>,
     response: Vec<i16>,
     candidates: Vec<Candidates>,
@@ -98,6 +102,7 @@ impl Measurer {
             bands: Bands::default(),
             lines: Vec::new(),
             noise: 0.0,
+            width_px: 0.0,
             memory: Vec::new(),
             response: Vec::new(),
             candidates: Vec::new(),
@@ -244,12 +249,13 @@ impl Work {
         let (lefts, rights) = (&lefts.all()[pair.pair.left].at, &rights.all()[pair.pair.right].at);
         let about = about(lefts, rights, strip.across);
         self.noise = noise::of(strip, about);
+        self.width_px = narrowest(lefts, rights, &mut self.memory);
         let scene = Scene {
             strip,
             bands: &self.bands,
             lines: &self.lines,
             noise: self.noise,
-            width_px: narrowest(lefts, rights, &mut self.memory),
+            width_px: self.width_px,
             bead_after: true,
         };
         let right_scene = Scene { bead_after: false, ..scene };
@@ -268,6 +274,11 @@ impl Work {
             let blur = common_blur(left, right);
             let left = self.left.trace(&self.table, &scene, blur);
             let right = self.right.trace(&self.table, &right_scene, blur);
+            if self.left.is_clear() && self.right.is_hidden() {
+                self.right.uncover_beside(&self.table, &right_scene, &self.left);
+            } else if self.right.is_clear() && self.left.is_hidden() {
+                self.left.uncover_beside(&self.table, &scene, &self.right);
+            }
             if left && right && !is_strange([self.left.misfit, self.right.misfit]) {
                 self.least_off_px = OFF_PX;
                 return Ok(());
@@ -402,7 +413,22 @@ impl Work {
             misfit: tracer.misfit,
         });
         let (gauge, middles) = (&self.gauge, self.middles.as_slice());
-        axis::width(&axis::Scene { view, surface, gauge, middles, sides }, hints, &mut self.axis)
+        let scene = axis::Scene { view, surface, gauge, middles, sides };
+        let found = axis::width(&scene, hints, &mut self.axis)?;
+        self.check_covered(&found)?;
+        Ok(found)
+    }
+
+    /// Refuses a bead of whose edges too little is uncovered to tell where they
+    /// run.
+    fn check_covered(&self, found: &WidthMeasurement) -> Result<(), Reject> {
+        let share = found.sigma.get() / found.width.get();
+        let covered = self.left.covered || self.right.covered;
+        if covered && share * f64::from(self.width_px) > COVERED_SIGMA_PX {
+            let got = self.left.used_share().min(self.right.used_share());
+            return Err(Reject::NoPair { got, need: NEED_ROWS });
+        }
+        Ok(())
     }
 }
 

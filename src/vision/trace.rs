@@ -35,6 +35,8 @@ const UNLIKE: f32 = 2.5;
 const WAVY_PX: f32 = 0.5;
 /// Rows that are taken together at most.
 const MOST_TOGETHER: usize = 8;
+/// Misfit up to which an edge is a blurred step for certain.
+const GOOD_FIT: f64 = 1.5;
 /// Wild pixels that a row may have; more are a grain.
 const FEW_WILD: f32 = 2.0;
 /// Share of the plain pixels that must be as they are expected for their level
@@ -129,6 +131,8 @@ pub struct Tracer {
     sort_rows: bool,
     /// Share of the rows that did not fit.
     unfit: f64,
+    /// Whether the edge seems to be covered in part.
+    suspect: bool,
     /// Whether the edge was found to be covered in part, and is located from
     /// its clear rows alone.
     pub covered: bool,
@@ -188,6 +192,16 @@ impl Tracer {
         &mut self.edges
     }
 
+    /// Whether the edge seems to be covered and no clear rows were found.
+    pub fn is_hidden(&self) -> bool {
+        self.suspect && !self.covered
+    }
+
+    /// Whether nothing covers the edge, or its clear rows are known.
+    pub fn is_clear(&self) -> bool {
+        (self.covered || !self.suspect) && self.misfit < GOOD_FIT
+    }
+
     /// Looks at the edge along rough places, one a band: its blur and how sure
     /// that is \[px\]. `None` where there is no edge.
     #[inline(always)]
@@ -200,6 +214,7 @@ impl Tracer {
         self.edges.clear();
         self.seen = None;
         self.path.clear();
+        self.suspect = false;
         self.covered = false;
         self.sort_rows = false;
         self.clear.clear();
@@ -239,7 +254,8 @@ impl Tracer {
         if !self.trace_open(table, scene, blur) {
             return false;
         }
-        if self.unfit > COVERED_SHARE {
+        self.suspect = self.unfit > COVERED_SHARE;
+        if self.suspect {
             self.covered = self.uncover(table, scene);
             if !self.covered {
                 return self.trace_again(table, scene, blur);
@@ -289,6 +305,7 @@ impl Tracer {
         let rough = picked.iter().map(|at| at.is_finite().then_some(*at));
         let seen = self.look(table, scene, rough);
         self.picked = picked;
+        self.suspect = true;
         seen.is_some() && self.trace_open(table, scene, blur)
     }
 

@@ -86,6 +86,37 @@ impl Tracer {
                 return false;
             }
         }
+        self.finish(table, scene)
+    }
+
+    /// The same where the bead's other edge shows how this one runs: where most
+    /// of it is covered, what covers it may agree better than what is left.
+    #[inline(always)]
+    pub fn uncover_beside<T: Grey>(
+        &mut self,
+        table: &StepTable,
+        scene: &Scene<'_, T>,
+        other: &Self,
+    ) -> bool {
+        self.sort_rows = true;
+        self.rough.clear();
+        let across =
+            |(band, at): (usize, &f32)| at - other.course.at(narrow(scene.bands.middle(band)))[0];
+        self.rough.extend(self.picked.iter().enumerate().map(across));
+        let near = |offset: f32| self.rough.iter().filter(move |at| (**at - offset).abs() < OFF_PX);
+        let most = self.rough.iter().copied().max_by_key(|&offset| near(offset).count());
+        let Some(most) = most else { return false };
+        self.free.clear();
+        for (at, offset) in self.picked.iter().zip(&self.rough) {
+            self.free.push(if (offset - most).abs() < OFF_PX { *at } else { f32::NAN });
+        }
+        self.covered = self.try_course(table, scene).is_some() && self.finish(table, scene);
+        self.covered
+    }
+
+    /// Locates the edge from its clear rows.
+    #[inline(always)]
+    fn finish<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
         let Some(shape) = self.read_shape(table, scene) else { return false };
         self.template.tabulate(table, &shape, false);
         self.blur_px = shape.step.blur;
