@@ -3,11 +3,12 @@
 //! held against it, and the rows of a band are solved for place and levels
 //! together.
 
+mod hidden;
 mod uncover;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::cut_off::{self, CutOff};
+use super::cut_off::CutOff;
 use super::overlay::{Extent, Look, Overlay, REACH, Shape, Step};
 use super::path::{self, Course};
 use super::pool::{self, Bands};
@@ -55,15 +56,6 @@ const PICK: (f32, f32) = (5.0, 3.0);
 /// Extra deviation of levels that is believed, in standard deviations of its
 /// own doubt.
 const BELIEVED: f64 = 2.5;
-
-/// Upper end of the camera's scale \[grey levels of 256\].
-const END: f64 = 255.0;
-/// Levels that come so near it are cut off by noise, in standard deviations.
-const NEAR_END: f64 = 1.5;
-
-/// Times that a path is smoothed before an edge that is cut off is read along
-/// it.
-const SMOOTHINGS: usize = 4;
 
 /// A caliper's edge with sub-pixel position.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -307,118 +299,6 @@ impl Tracer {
         self.picked = picked;
         self.suspect = true;
         seen.is_some() && self.trace_open(table, scene, blur)
-    }
-
-    /// Blur of the edge that was looked at and its standard deviation \[px\].
-    pub fn blur(&self) -> Option<(f64, f64)> {
-        self.seen.map(|seen| (seen.step.blur, seen.blur_sd))
-    }
-
-    /// Whether the levels on either side of the edge that was looked at pass the
-    /// end of the scale, or come so near that noise does: before it, after it.
-    pub fn is_cut_off<T: Grey>(&self, scene: &Scene<'_, T>) -> [bool; 2] {
-        let Some(seen) = &self.seen else { return [false; 2] };
-        let (before, step) = self.levels();
-        let limit = END - NEAR_END * f64::from(scene.noise);
-        [seen.step.before, seen.step.after].map(|level| before + step * level > limit)
-    }
-
-    /// Mean level before the edge and mean step, as picked \[grey levels\].
-    fn levels(&self) -> (f64, f64) {
-        (typical(&self.before).into(), typical(&self.step).into())
-    }
-
-    /// Locates an edge that is cut off at the end of the scale on one side.
-    /// Returns what is known of it, `None` where that is nothing.
-    pub fn trace_cut_off<T: Grey>(
-        &mut self,
-        table: &StepTable,
-        scene: &Scene<'_, T>,
-        hidden_after: bool,
-    ) -> Option<cut_off::Found> {
-        let seen = self.seen?;
-        let (before, height) = self.levels();
-        let Extent { before: room_before, after: room_after } = seen.room;
-        let (visible, room) = if hidden_after {
-            (seen.step.before, [room_before, room_after])
-        } else {
-            (seen.step.after, [room_after, room_before])
-        };
-        let visible = before + height * visible;
-        let noise = f64::from(scene.noise);
-        let mut task = cut_off::Scene { hidden_after, noise, white: END, room, shading: 0.0 };
-        let Step { at, blur, .. } = seen.step;
-        let start = cut_off::Step { at, blur, visible, hidden: END + 0.3 * (END - visible) };
-        let rough = self.cut_off.fit(table, &task, &self.overlay, (start, None))?;
-        self.course.adopt(narrow(rough.step.at), (0.0, 1.0));
-        self.locate_cut_off(table, scene, &task, &rough);
-        // A path that jitters rounds off the corner at the end of the scale,
-        // which looks like a higher level.
-        self.straighten(scene);
-        self.overlay.lay(&self.sheet, &self.course);
-        let start = cut_off::Step { at: 0.0, ..rough.step };
-        let first = self.cut_off.fit(table, &task, &self.overlay, (start, None))?;
-        // The surroundings that can be seen, beside the step as it really is.
-        let share = |level: f64| (level - before) / height;
-        let (visible, hidden) = (share(first.step.visible), share(first.step.hidden));
-        let (before, after) = if hidden_after { (visible, hidden) } else { (hidden, visible) };
-        let step = Step { at: first.step.at, blur: first.step.blur, before, after };
-        let (extent, (slope, doubt)) = self.overlay.beside(table, &seen, &step, !hidden_after);
-        task.room[0] = extent;
-        task.shading = slope * height;
-        let blur = self.cut_off.expected_blur(&first);
-        let found = self.cut_off.fit(table, &task, &self.overlay, (first.step, blur))?;
-        self.cut_off.remember(&found);
-        let per_level = std::f64::consts::PI * found.step.blur * found.step.blur;
-        self.blur_px = found.step.blur;
-        self.common_variance = found.variance + per_level * doubt / (after - before).powi(2);
-        self.course.adopt(narrow(found.step.at), (0.0, 1.0));
-        self.locate_cut_off(table, scene, &task, &found);
-        Some(found)
-    }
-
-    /// Draws a smooth path through the edges that were found.
-    fn straighten<T: Grey>(&mut self, scene: &Scene<'_, T>) {
-        let places = self.edges.iter().map(|edge| edge.map(|edge| narrow(edge.at)));
-        if !path::fill(places, &mut self.rough) {
-            return;
-        }
-        path::median_of_three(&mut self.rough);
-        for _ in 0..SMOOTHINGS {
-            path::smooth(&self.rough, &mut self.path);
-            std::mem::swap(&mut self.rough, &mut self.path);
-        }
-        self.course.redraw(scene.lines, &self.rough, &mut self.memory);
-        self.read(scene);
-    }
-
-    fn locate_cut_off<T: Grey>(
-        &mut self,
-        table: &StepTable,
-        scene: &Scene<'_, T>,
-        task: &cut_off::Scene,
-        found: &cut_off::Found,
-    ) {
-        let height = found.step.hidden - found.step.visible;
-        let height = if task.hidden_after { height } else { -height };
-        for _ in 0..MAX_PASSES {
-            let (edges, course) = (&mut self.edges, &self.course);
-            let mut off: f64 = 0.0;
-            edges.clear();
-            let rows = (&self.sheet, course, scene.lines.len());
-            self.misfit = self.cut_off.locate(table, task, rows, found, |line, located| {
-                edges.push(located.map(|located| {
-                    let [path, _, _] = course.at(narrow(pool::middle(scene.lines[line])));
-                    let cut_off::Line { moved, variance, share } = located;
-                    off = off.max(moved.abs());
-                    Located { at: f64::from(path) + moved, variance, height, share }
-                }));
-            });
-            if off <= NEAR_ENOUGH * found.step.blur {
-                break;
-            }
-            self.redraw(scene);
-        }
     }
 
     fn look_for_texture<T: Grey>(&mut self, scene: &Scene<'_, T>, noise: f64) {
