@@ -259,27 +259,35 @@ impl Work {
             bead_after: true,
         };
         let right_scene = Scene { bead_after: false, ..scene };
-        let left = self.left.look(&self.table, &scene, lefts.iter().copied());
-        let right = self.right.look(&self.table, &right_scene, rights.iter().copied());
+        let scenes = [scene, right_scene];
+        let mut seen = [None; 2];
+        // A loop, so that what is inlined into it is compiled once for both.
+        let sides = [(&mut self.left, lefts), (&mut self.right, rights)];
+        for ((tracer, rough), (scene, seen)) in sides.into_iter().zip(scenes.iter().zip(&mut seen))
+        {
+            *seen = tracer.look(&self.table, scene, rough.iter().copied());
+        }
         let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
-        if let (Some(left), Some(right)) = (left, right) {
+        if let [Some(left), Some(right)] = seen {
             let cut_off = [self.left.is_cut_off(&scene), self.right.is_cut_off(&right_scene)];
             if cut_off != [[false; 2]; 2] {
                 self.least_off_px = OFF_PX;
                 let tracers = [&mut self.left, &mut self.right];
-                let bead = saturated::Bead { scenes: [scene, right_scene], lefts, rights };
+                let bead = saturated::Bead { scenes, lefts, rights };
                 self.noise = bead.trace(tracers, &self.table, cut_off)?;
                 return Ok(());
             }
             let blur = common_blur(left, right);
-            let left = self.left.trace(&self.table, &scene, blur);
-            let right = self.right.trace(&self.table, &right_scene, blur);
+            let mut found = true;
+            for (tracer, scene) in [&mut self.left, &mut self.right].into_iter().zip(&scenes) {
+                found &= tracer.trace(&self.table, scene, blur);
+            }
             if self.left.is_clear() && self.right.is_hidden() {
                 self.right.uncover_beside(&self.table, &right_scene, &self.left);
             } else if self.right.is_clear() && self.left.is_hidden() {
                 self.left.uncover_beside(&self.table, &scene, &self.right);
             }
-            if left && right && !is_strange([self.left.misfit, self.right.misfit]) {
+            if found && !is_strange([self.left.misfit, self.right.misfit]) {
                 self.least_off_px = OFF_PX;
                 return Ok(());
             }

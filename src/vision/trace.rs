@@ -285,7 +285,8 @@ impl Tracer {
     }
 
     /// Traces once more as if nothing covered the edge.
-    #[inline(always)]
+    #[cold]
+    #[inline(never)]
     fn trace_again<T: Grey>(
         &mut self,
         table: &StepTable,

@@ -53,7 +53,8 @@ const ELSEWHERE_PX: f32 = 1.0;
 impl Tracer {
     /// Locates an edge from the rows that show it and nothing else. Returns
     /// whether there are enough of them.
-    #[inline(always)]
+    #[cold]
+    #[inline(never)]
     pub(super) fn uncover<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
         self.sort_rows = true;
         self.texture = None;
@@ -91,7 +92,8 @@ impl Tracer {
 
     /// The same where the bead's other edge shows how this one runs: where most
     /// of it is covered, what covers it may agree better than what is left.
-    #[inline(always)]
+    #[cold]
+    #[inline(never)]
     pub fn uncover_beside<T: Grey>(
         &mut self,
         table: &StepTable,
@@ -115,7 +117,7 @@ impl Tracer {
     }
 
     /// Locates the edge from its clear rows.
-    #[inline(always)]
+    #[inline(never)]
     fn finish<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
         let Some(shape) = self.read_shape(table, scene) else { return false };
         self.template.tabulate(table, &shape, false);
@@ -129,7 +131,7 @@ impl Tracer {
 
     /// Tells the clear rows along the course that most of the free bands agree
     /// on, and their share. `None` where there are too few.
-    #[inline(always)]
+    #[inline(never)]
     fn try_course<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> Option<f32> {
         self.clear.clear();
         if !self.take_course(scene) {
@@ -224,7 +226,7 @@ impl Tracer {
     }
 
     /// Tells which rows are clear; returns whether there are enough.
-    #[inline(always)]
+    #[inline(never)]
     fn judge_rows<T: Grey>(&mut self, scene: &Scene<'_, T>, blur: f64) -> bool {
         let limit = self.limit_of_rows(scene.noise);
         let far = self.far_of_rows(scene, limit);
@@ -288,7 +290,7 @@ impl Tracer {
 
     /// Longest run of rows that do not fit, but show the same edge where their
     /// band has one.
-    #[inline(always)]
+    #[inline(never)]
     fn elsewhere<T: Grey>(&self, scene: &Scene<'_, T>, limit: f32) -> f32 {
         let (mut longest, mut run) = (0.0f32, 0.0);
         let windows = self.sheet.windows();
