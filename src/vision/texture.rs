@@ -15,6 +15,9 @@ const NOTABLE: f64 = 1.25;
 const AT_EDGE: f64 = 1.6;
 /// Least variance of a texture, in that of the noise.
 const LEAST: f64 = 0.1;
+/// Longest texture \[px\]: what changes more slowly is light, or the bead's
+/// shape, which the levels of the caliper lines follow.
+const LONGEST_PX: f64 = 11.0;
 /// Samples beyond so many standard deviations are grains and sparks.
 const MANY_SIGMA: f64 = 4.0;
 /// Rows that differ by so many medians of what rows do have one on them.
@@ -26,7 +29,7 @@ const LEAST_ROOM: usize = 2 * LAGS;
 /// Longest stretch of a row on one side of the edge \[px\].
 const MOST_ROOM: usize = 40;
 
-/// Autocorrelations exp(−(r/length)^power) that are tried.
+/// Autocorrelations exp(−(r/length)^power) that are tried, up to 19 px.
 const POWERS: [f64; 5] = [1.0, 1.25, 1.5, 1.75, 2.0];
 const LENGTHS: usize = 30;
 const FIRST_LENGTH_PX: f64 = 0.7;
@@ -82,6 +85,9 @@ impl Texture {
             return None;
         }
         let Fit { power, length, variance, kept } = TABLES.fit(&all, rows);
+        if length > LONGEST_PX {
+            return None;
+        }
         // What neighbouring rows differ by, as noise is found, has a little of
         // the texture in it.
         let noise = (rows * (all[0] - kept * variance)).clamp(0.25 * noise, 1.1 * noise);
