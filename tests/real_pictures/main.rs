@@ -71,7 +71,8 @@ fn a_real_bead_is_measured_where_it_is_and_nowhere_else() {
     let widths = widths(folder.path());
     assert_eq!(widths.len(), 302);
     assert_eq!(widths[..80].iter().flatten().count(), 0, "without a bead");
-    assert_eq!(widths[90..].iter().flatten().count(), 212, "with a bead");
+    let refused: Vec<usize> = (90..302).filter(|&frame| widths[frame].is_none()).collect();
+    assert!(refused.is_empty(), "with a bead: {refused:?} are refused");
 }
 
 #[test]
@@ -82,7 +83,8 @@ fn profiles_of_a_real_bead_agree_once_its_motion_is_taken_out() {
     let (mut all, mut still, mut moved) = <(Difference, Difference, Difference)>::default();
     let mut shifts = Vec::new();
     for frame in 90..301 {
-        let (earlier, later) = (&profiles[&frame], &profiles[&(frame + 1)]);
+        let pair = (profiles.get(&frame), profiles.get(&(frame + 1)));
+        let (Some(earlier), Some(later)) = pair else { continue };
         let shift = best_shift(earlier, later);
         let in_place = Difference::between(earlier, later, 0.0);
         let with_motion = Difference::between(earlier, later, shift);
