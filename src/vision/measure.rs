@@ -283,9 +283,9 @@ impl Work {
                 found &= tracer.trace(&self.table, scene, blur);
             }
             if self.left.is_clear() && self.right.is_hidden() {
-                self.right.uncover_beside(&self.table, &right_scene, &self.left);
+                found &= self.right.uncover_beside(&self.table, &right_scene, (blur, &self.left));
             } else if self.right.is_clear() && self.left.is_hidden() {
-                self.left.uncover_beside(&self.table, &scene, &self.right);
+                found &= self.left.uncover_beside(&self.table, &scene, (blur, &self.right));
             }
             if found && !is_strange([self.left.misfit, self.right.misfit]) {
                 self.least_off_px = OFF_PX;
@@ -361,11 +361,10 @@ impl Work {
     fn sort_out(&mut self) -> Result<(), Reject> {
         let mut worst: f64 = 0.0;
         for side in [&mut self.left, &mut self.right] {
-            worst = worst.max(outlier::sort_out(
-                side.edges_mut(),
-                self.least_off_px,
-                &mut self.scatter,
-            ));
+            let edges = side.edges_mut();
+            let sigma = outlier::sort_out(edges, self.least_off_px, &mut self.scatter);
+            outlier::drop_strays(edges, sigma);
+            worst = worst.max(sigma);
         }
         let got = self.left.used_share().min(self.right.used_share());
         let enough =

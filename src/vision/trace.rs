@@ -51,6 +51,9 @@ const LEAST_CLEAR_SHARE: f64 = 0.2;
 /// by how much the squares that they leave exceed what may be noise.
 const COVERED_SHARE: f64 = 0.03;
 const UNFIT: f32 = 1.5;
+/// Misfit of the clear rows from which on the edge is not covered, but no blurred
+/// step at all.
+const CLEAR_FIT: f64 = 1.25;
 /// Where levels are picked first: distance from the edge, and apart \[px\].
 const PICK: (f32, f32) = (5.0, 3.0);
 /// Extra deviation of levels that is believed, in standard deviations of its
@@ -212,26 +215,36 @@ impl Tracer {
         self.clear.clear();
         self.picked.clear();
         self.picked.extend(rough.map(|at| at.unwrap_or(f32::NAN)));
-        let rough = self.picked.iter().map(|at| at.is_finite().then_some(*at));
-        if !path::fill(rough, &mut self.rough) {
+        if !self.take_picked(scene) {
             return None;
         }
-        path::take_out_wild(&mut self.rough, &mut self.sorted);
-        let rest = self.rough.iter().map(|at| at.is_finite().then_some(*at));
-        if !path::fill(rest, &mut self.path) {
-            return None;
-        }
-        path::median_of_three(&mut self.path);
-        path::smooth(&self.path, &mut self.rough);
-        std::mem::swap(&mut self.rough, &mut self.path);
-        self.pick_levels(scene);
-        self.course.draw(scene.bands, &self.path, &self.before, &self.step);
         self.read(scene);
         self.overlay.lay(&self.sheet, &self.course);
         let noise = f64::from(scene.noise) / f64::from(typical(&self.step).abs());
         self.seen = self.overlay.look(table, noise, self.room(scene));
         self.look_for_texture(scene, noise);
         self.seen.map(|seen| (seen.step.blur, seen.blur_sd))
+    }
+
+    /// Draws the path through the picked places, as far as they are not wild, with
+    /// the levels beside it. Returns whether there is any.
+    #[inline(always)]
+    fn take_picked<T: Grey>(&mut self, scene: &Scene<'_, T>) -> bool {
+        let rough = self.picked.iter().map(|at| at.is_finite().then_some(*at));
+        if !path::fill(rough, &mut self.rough) {
+            return false;
+        }
+        path::take_out_wild(&mut self.rough, &mut self.sorted);
+        let rest = self.rough.iter().map(|at| at.is_finite().then_some(*at));
+        if !path::fill(rest, &mut self.path) {
+            return false;
+        }
+        path::median_of_three(&mut self.path);
+        path::smooth(&self.path, &mut self.rough);
+        std::mem::swap(&mut self.rough, &mut self.path);
+        self.pick_levels(scene);
+        self.course.draw(scene.bands, &self.path, &self.before, &self.step);
+        true
     }
 
     /// Locates the edge that was looked at, with what is known of its blur:
@@ -248,7 +261,7 @@ impl Tracer {
         }
         self.suspect = self.unfit > COVERED_SHARE;
         if self.suspect {
-            self.covered = self.uncover(table, scene);
+            self.covered = self.uncover(table, scene) && self.misfit < CLEAR_FIT;
             if !self.covered {
                 return self.trace_again(table, scene, blur);
             }
@@ -334,16 +347,17 @@ impl Tracer {
 
     /// Locates the edge anew, line by line, where it is not a blurred step.
     /// Returns whether there is one.
+    #[cold]
     pub fn refine<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
         let width_px = f64::from(scene.width_px);
         let task = Task { strip: scene.strip, lines: scene.lines, width_px };
-        if self.path.is_empty() {
+        // A blurred step that does not fit says nothing of the place either.
+        if !self.take_picked(scene) {
             return false;
         }
+        self.covered = false;
         self.edges.clear();
         self.edges.resize(scene.lines.len(), None);
-        // A blurred step that does not fit says nothing of the place either.
-        self.course.draw(scene.bands, &self.path, &self.before, &self.step);
         let course = &self.course;
         let rough =
             scene.lines.iter().map(|&line| f64::from(course.at(narrow(pool::middle(line)))[0]));

@@ -1,7 +1,7 @@
 //! An edge that grains or spots cover in part: which rows show it and nothing
 //! else. All that is known of it is taken from those rows alone.
 
-use super::{MANY_SIGMA, Tracer, narrow, typical};
+use super::{CLEAR_FIT, MANY_SIGMA, Tracer, narrow, typical};
 use crate::vision::agree::agree;
 use crate::vision::overlay::{Extent, Shape};
 use crate::vision::path;
@@ -98,7 +98,7 @@ impl Tracer {
         &mut self,
         table: &StepTable,
         scene: &Scene<'_, T>,
-        other: &Self,
+        (blur, other): ((f64, f64), &Self),
     ) -> bool {
         self.sort_rows = true;
         self.rough.clear();
@@ -112,8 +112,10 @@ impl Tracer {
         for (at, offset) in self.picked.iter().zip(&self.rough) {
             self.free.push(if (offset - most).abs() < OFF_PX { *at } else { f32::NAN });
         }
-        self.covered = self.try_course(table, scene).is_some() && self.finish(table, scene);
-        self.covered
+        self.covered = self.try_course(table, scene).is_some()
+            && self.finish(table, scene)
+            && self.misfit < CLEAR_FIT;
+        self.covered || self.trace_again(table, scene, blur)
     }
 
     /// Locates the edge from its clear rows.
