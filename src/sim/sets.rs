@@ -47,8 +47,10 @@ impl Set {
     ///
     /// A line across a step of the height A that is blurred with s, in white
     /// noise σ, tells the step's place with a variance of at least
-    /// 2√π·(σ/A)²·s (Cramér–Rao), whatever else is unknown of the step's
-    /// levels and blur, which are even about its place. Along a row that cuts
+    /// 2√π·(σ/A)²·s (Cramér–Rao), whether or not blur and height of the step are
+    /// known, whose effects are odd about its place. (A level that both sides
+    /// share is even like the place and costs a little more, the less the
+    /// more pixels there are beside the edge.) Along a row that cuts
     /// the edge at the slant t the blur is s/cos t, and what is found along the
     /// row is cos t as long normal to the edge. From N rows and two edges:
     ///
