@@ -362,9 +362,7 @@ impl Work {
         let mut worst: f64 = 0.0;
         for side in [&mut self.left, &mut self.right] {
             let edges = side.edges_mut();
-            let sigma = outlier::sort_out(edges, self.least_off_px, &mut self.scatter);
-            outlier::drop_strays(edges, sigma);
-            worst = worst.max(sigma);
+            worst = worst.max(outlier::sort_out(edges, self.least_off_px, &mut self.scatter));
         }
         let got = self.left.used_share().min(self.right.used_share());
         let enough =

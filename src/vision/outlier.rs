@@ -7,13 +7,6 @@ const SPANS: [usize; 3] = [1, 2, 3];
 /// Deviation that makes an outlier, in robust standard deviations.
 const MANY_SIGMA: f64 = 5.0;
 
-/// Edges at an end of the gauge that may be strays, and their neighbours beyond
-/// the gap that tell.
-const STRAYS: usize = 4;
-const GUIDES: usize = 8;
-/// Distance from the neighbours' line that makes a stray \[px\].
-const STRAY_PX: f64 = 1.0;
-
 /// Removes edges that lie far from the line between their neighbours, and
 /// returns the robust standard deviation of the deviations \[px\]. `memory` is
 /// scratch; `least_px` is the least deviation that makes an outlier.
@@ -40,65 +33,6 @@ pub fn sort_out(edges: &mut [Option<Located>], least_px: f64, memory: &mut Vec<f
         }
     }
     sigma
-}
-
-/// Removes a few edges at either end of the gauge that lie beyond a gap and off
-/// the line that the rest runs in: there the bead turns away, or what is seen is
-/// not its edge. A course through them would be bent by them.
-pub fn drop_strays(edges: &mut [Option<Located>], sigma_px: f64) {
-    let limit = STRAY_PX.max(MANY_SIGMA * sigma_px);
-    drop_strays_at_end(edges.iter_mut(), limit);
-    drop_strays_at_end(edges.iter_mut().rev(), limit);
-}
-
-/// The same at the end that comes first, as often as there is such a group.
-fn drop_strays_at_end<'a>(edges: impl Iterator<Item = &'a mut Option<Located>>, limit: f64) {
-    let mut places: [(f64, f64); STRAYS + GUIDES] = [(0.0, 0.0); STRAYS + GUIDES];
-    let (mut n, mut group, mut before) = (0, None, 0.0);
-    let mut first: [Option<&mut Option<Located>>; STRAYS] = [const { None }; STRAYS];
-    for (place, edge) in (0u32..).map(f64::from).zip(edges) {
-        let Some(located) = edge.as_ref() else { continue };
-        if group.is_none() && n > 0 && place - before > 1.0 {
-            group = Some(n);
-        }
-        if group.is_none() && n == STRAYS {
-            return;
-        }
-        places[n] = (place, located.at);
-        if group.is_none() {
-            first[n] = Some(edge);
-        }
-        n += 1;
-        before = place;
-        if group.is_some_and(|group| n == group + GUIDES) {
-            break;
-        }
-    }
-    let Some(group) = group else { return };
-    let (strays, guides) = places[..n].split_at(group);
-    if guides.len() < GUIDES || strays.iter().all(|stray| off_line(guides, *stray) <= limit) {
-        return;
-    }
-    for edge in first.into_iter().flatten() {
-        *edge = None;
-    }
-}
-
-/// Distance of a place from the straight line through others.
-fn off_line(guides: &[(f64, f64)], (place, at): (f64, f64)) -> f64 {
-    let (mut n, mut x, mut y) = (0.0, 0.0, 0.0);
-    for (place, at) in guides {
-        n += 1.0;
-        x += place;
-        y += at;
-    }
-    let (x, y) = (x / n, y / n);
-    let (mut over, mut under) = (0.0, 0.0);
-    for (place, at) in guides {
-        over += (place - x) * (at - y);
-        under += (place - x) * (place - x);
-    }
-    (at - y - over / under * (place - x)).abs()
 }
 
 /// How far an edge lies from the line between neighbours at equal distance on
@@ -155,21 +89,5 @@ mod tests {
         sort_out(&mut edges, 0.3, &mut Vec::new());
         assert!(edges[12].is_none());
         assert_eq!(edges.iter().flatten().count(), 29);
-    }
-
-    #[test]
-    fn edges_beyond_a_gap_that_turn_away_are_dropped_and_others_stay() {
-        let mut turned = edges();
-        for (k, off) in [(23, None), (24, None), (25, Some(2.0)), (26, Some(4.0)), (27, None)] {
-            turned[k] = turned[k].and_then(|edge| Some(Located { at: edge.at + off?, ..edge }));
-        }
-        turned[28] = None;
-        turned[29] = None;
-        drop_strays(&mut turned, 0.05);
-        assert_eq!(turned.iter().flatten().count(), 23);
-        let mut whole = edges();
-        whole[26] = None;
-        drop_strays(&mut whole, 0.05);
-        assert_eq!(whole.iter().flatten().count(), 29);
     }
 }
