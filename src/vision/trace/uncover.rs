@@ -56,9 +56,7 @@ impl Tracer {
     #[cold]
     #[inline(never)]
     pub(super) fn uncover<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
-        self.sort_rows = true;
-        self.texture = None;
-        self.scatter_in_texture = None;
+        self.look_row_by_row();
         self.free.clear();
         self.free.extend_from_slice(&self.picked);
         let mut best = (NONE_CLEAR, 0);
@@ -90,6 +88,14 @@ impl Tracer {
         self.finish(table, scene)
     }
 
+    /// Rows are judged one by one, each against noise alone: what covers some of
+    /// them would pass for texture.
+    fn look_row_by_row(&mut self) {
+        self.sort_rows = true;
+        self.texture = None;
+        self.scatter_in_texture = None;
+    }
+
     /// The same where the bead's other edge shows how this one runs: where most
     /// of it is covered, what covers it may agree better than what is left.
     #[cold]
@@ -100,7 +106,7 @@ impl Tracer {
         scene: &Scene<'_, T>,
         (blur, other): ((f64, f64), &Self),
     ) -> bool {
-        self.sort_rows = true;
+        self.look_row_by_row();
         self.rough.clear();
         let across =
             |(band, at): (usize, &f32)| at - other.course.at(narrow(scene.bands.middle(band)))[0];
