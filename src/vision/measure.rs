@@ -7,12 +7,14 @@ use crate::geometry::ImagePoint;
 
 use super::axis;
 use super::contour::Contours;
+use super::covered;
 use super::edge::{Candidates, REACH, respond};
 use super::edge_lines;
 use super::gauge::{Gauge, Method, Polarity};
 use super::noise;
 use super::outlier;
 use super::pair::{self, Pair, Search};
+use super::parallel::Parallel;
 use super::pool::{self, Bands};
 use super::reject::Reject;
 use super::saturated;
@@ -81,6 +83,7 @@ struct Work {
     candidates: Vec<Candidates>,
     ups: Contours,
     downs: Contours,
+    parallel: Parallel,
     left: Tracer,
     right: Tracer,
     least_off_px: f64,
@@ -108,6 +111,7 @@ impl Measurer {
             candidates: Vec::new(),
             ups: Contours::default(),
             downs: Contours::default(),
+            parallel: Parallel::default(),
             left: Tracer::default(),
             right: Tracer::default(),
             least_off_px: OFF_PX,
@@ -282,10 +286,11 @@ impl Work {
             for (tracer, scene) in [&mut self.left, &mut self.right].into_iter().zip(&scenes) {
                 found &= tracer.trace(&self.table, scene, blur);
             }
-            if self.left.is_clear() && self.right.is_hidden() {
-                found &= self.right.uncover_beside(&self.table, &right_scene, (blur, &self.left));
-            } else if self.right.is_clear() && self.left.is_hidden() {
-                found &= self.left.uncover_beside(&self.table, &scene, (blur, &self.right));
+            if self.left.is_hidden() || self.right.is_hidden() {
+                let candidates = &self.candidates;
+                let bead = covered::Bead { scenes, candidates, bright: pair.bright };
+                let tracers = [&mut self.left, &mut self.right];
+                found &= bead.uncover(tracers, &self.table, blur, &mut self.parallel);
             }
             if found && !is_strange([self.left.misfit, self.right.misfit]) {
                 self.least_off_px = OFF_PX;

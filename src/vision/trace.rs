@@ -197,6 +197,11 @@ impl Tracer {
         (self.covered || !self.suspect) && self.misfit < GOOD_FIT
     }
 
+    /// Where the edge is expected at a place along it \[px\].
+    pub fn expected_at(&self, v: f64) -> f32 {
+        self.course.at(narrow(v))[0]
+    }
+
     /// Looks at the edge along rough places, one a band: its blur and how sure
     /// that is \[px\]. `None` where there is no edge.
     #[inline(always)]

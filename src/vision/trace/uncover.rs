@@ -98,26 +98,19 @@ impl Tracer {
 
     /// The same where the bead's other edge shows how this one runs: where most
     /// of it is covered, what covers it may agree better than what is left.
+    /// `places` are those that run beside the other edge, one a band, NaN in
+    /// bands without.
     #[cold]
     #[inline(never)]
-    pub fn uncover_beside<T: Grey>(
+    pub fn uncover_along<T: Grey>(
         &mut self,
         table: &StepTable,
         scene: &Scene<'_, T>,
-        (blur, other): ((f64, f64), &Self),
+        (blur, places): ((f64, f64), &[f32]),
     ) -> bool {
         self.look_row_by_row();
-        self.rough.clear();
-        let across =
-            |(band, at): (usize, &f32)| at - other.course.at(narrow(scene.bands.middle(band)))[0];
-        self.rough.extend(self.picked.iter().enumerate().map(across));
-        let near = |offset: f32| self.rough.iter().filter(move |at| (**at - offset).abs() < OFF_PX);
-        let most = self.rough.iter().copied().max_by_key(|&offset| near(offset).count());
-        let Some(most) = most else { return false };
         self.free.clear();
-        for (at, offset) in self.picked.iter().zip(&self.rough) {
-            self.free.push(if (offset - most).abs() < OFF_PX { *at } else { f32::NAN });
-        }
+        self.free.extend_from_slice(places);
         self.covered = self.try_course(table, scene).is_some()
             && self.finish(table, scene)
             && self.misfit < CLEAR_FIT;

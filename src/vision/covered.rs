@@ -1,0 +1,73 @@
+//! A bead of whose edges so much is covered that one alone does not tell which
+//! of its rows are clear.
+
+use super::edge::{Candidate, Candidates};
+use super::parallel::Parallel;
+use super::step::StepTable;
+use super::strip::Grey;
+use super::trace::{Scene, Tracer};
+
+/// By how much the distance of two steps may differ from that of the rough
+/// edges \[px\].
+const ABOUT_PX: f32 = 40.0;
+
+/// A bead that was looked at.
+#[derive(Debug, Clone, Copy)]
+pub struct Bead<'a, T> {
+    /// What is looked at, left and right.
+    pub scenes: [Scene<'a, T>; 2],
+    /// All steps of the bands.
+    pub candidates: &'a [Candidates],
+    /// Whether the bead is brighter than what lies beside it.
+    pub bright: bool,
+}
+
+impl<T: Grey> Bead<'_, T> {
+    /// Locates the hidden one of two edges, or both, along steps that run beside
+    /// each other. Returns whether all could be located, covered or not.
+    #[cold]
+    pub fn uncover(
+        &self,
+        [left, right]: [&mut Tracer; 2],
+        table: &StepTable,
+        blur: (f64, f64),
+        parallel: &mut Parallel,
+    ) -> bool {
+        let [left_scene, right_scene] = &self.scenes;
+        let width = left_scene.width_px;
+        let range = width - ABOUT_PX..width + ABOUT_PX;
+        let bands = self.candidates.len();
+        let lefts = |band| self.places(band, left, left_scene, self.bright);
+        let rights = |band| self.places(band, right, right_scene, !self.bright);
+        if !parallel.find(bands, (lefts, rights), range) {
+            return true;
+        }
+        let mut found = true;
+        if left.is_hidden() {
+            found &= left.uncover_along(table, left_scene, (blur, parallel.lefts()));
+        }
+        if right.is_hidden() {
+            found &= right.uncover_along(table, right_scene, (blur, parallel.rights()));
+        }
+        found
+    }
+
+    /// Where an edge may be in a band: where it was located, or at any step of
+    /// its kind.
+    fn places(
+        &self,
+        band: usize,
+        tracer: &Tracer,
+        scene: &Scene<'_, T>,
+        up: bool,
+    ) -> impl Iterator<Item = f32> {
+        let candidates = &self.candidates[band];
+        let steps: &[Candidate] = match (tracer.is_clear(), up) {
+            (true, _) => &[],
+            (false, true) => candidates.up(),
+            (false, false) => candidates.down(),
+        };
+        let known = tracer.is_clear().then(|| tracer.expected_at(scene.bands.middle(band)));
+        known.into_iter().chain(steps.iter().map(|step| step.at))
+    }
+}
