@@ -120,6 +120,14 @@ pub fn width(
 }
 
 impl Side<'_> {
+    /// By how much places with gaps between them scatter more than noise
+    /// explains.
+    fn inflation_with_gaps(&self, off: &[Option<f64>], curve: &Curve, per_place: f64) -> f64 {
+        let places = off.iter().zip(self.places);
+        let places = places.filter_map(|(off, located)| Some(((*off)?, located.as_ref()?.share)));
+        scatter::inflation_with_gaps(places, per_place, curve.count)
+    }
+
     /// Most that neighbouring places can hang together: what moves an edge,
     /// unless it is the bead itself, leaves a misfit. Edges that are covered
     /// here and there may hide anything.
@@ -390,8 +398,9 @@ impl Spread {
         for (side, curve) in curves.iter().enumerate() {
             let per_place = mean_variance(scene.sides[side].places);
             let off = &memory.off[side];
-            let inflation = scatter::inflation(off, per_place, &mut memory.values);
-            let inflation = inflation.min(scene.sides[side].most_inflation());
+            let inflation = scatter::inflation(off, per_place, &mut memory.values)
+                .unwrap_or_else(|| scene.sides[side].inflation_with_gaps(off, curve, per_place))
+                .min(scene.sides[side].most_inflation());
             let scale = sections.scales[side] * sections.scales[side];
             let of_mean = per_place * inflation * curve.mean_variance;
             variance += scale * (of_mean + scene.sides[side].common_variance);

@@ -31,6 +31,8 @@ pub struct Point {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curve {
     terms: [f64; MOST],
+    /// Number of its terms.
+    pub count: usize,
     /// Variance of the mean over the gauge, for points of weight 1 and
     /// variance 1.
     pub mean_variance: f64,
@@ -81,7 +83,7 @@ impl Curve {
         let sound = terms.iter().all(|term| term.is_finite());
         let (mean_variance, slope_variance) = (inverse[(0, 0)], inverse[(1, 1)]);
         let bend_variance = if N > 2 { inverse[(N.min(3) - 1, N.min(3) - 1)] } else { 0.0 };
-        sound.then_some(Self { terms, mean_variance, slope_variance, bend_variance })
+        sound.then_some(Self { terms, count: N, mean_variance, slope_variance, bend_variance })
     }
 
     /// Its Legendre coefficient of an order \[px\]; 0 of those that it does not

@@ -87,6 +87,7 @@ struct Work {
     left: Tracer,
     right: Tracer,
     least_off_px: f64,
+    is_lost: bool,
     contrasts: [f64; 2],
     scatter: Vec<f64>,
     middles: Vec<f64>,
@@ -115,6 +116,7 @@ impl Measurer {
             left: Tracer::default(),
             right: Tracer::default(),
             least_off_px: OFF_PX,
+            is_lost: false,
             contrasts: [0.0; 2],
             scatter: Vec::new(),
             middles: Vec::new(),
@@ -265,6 +267,7 @@ impl Work {
         let right_scene = Scene { bead_after: false, ..scene };
         let scenes = [scene, right_scene];
         let mut seen = [None; 2];
+        self.is_lost = false;
         // A loop, so that what is inlined into it is compiled once for both.
         let sides = [(&mut self.left, lefts), (&mut self.right, rights)];
         for ((tracer, rough), (scene, seen)) in sides.into_iter().zip(scenes.iter().zip(&mut seen))
@@ -292,7 +295,8 @@ impl Work {
                 let tracers = [&mut self.left, &mut self.right];
                 found &= bead.uncover(tracers, &self.table, blur, &mut self.parallel);
             }
-            if found && !is_strange([self.left.misfit, self.right.misfit]) {
+            self.is_lost = self.one_is_lost();
+            if found && !self.is_lost && !is_strange([self.left.misfit, self.right.misfit]) {
                 self.least_off_px = OFF_PX;
                 return Ok(());
             }
@@ -301,6 +305,13 @@ impl Work {
         let left = self.left.refine(&self.table, &scene);
         let right = self.right.refine(&self.table, &right_scene);
         if left && right { Ok(()) } else { Err(failed) }
+    }
+
+    /// Whether one edge alone is hidden: then it is covered, not of another kind
+    /// than the other one.
+    fn one_is_lost(&self) -> bool {
+        let lost = |side: &Tracer| side.is_hidden() && side.misfit > STRANGE;
+        lost(&self.left) != lost(&self.right)
     }
 
     /// The believed widths in pixels across the gauge's middle.
@@ -433,7 +444,7 @@ impl Work {
     /// run.
     fn check_covered(&self, found: &WidthMeasurement) -> Result<(), Reject> {
         let share = found.sigma.get() / found.width.get();
-        let covered = self.left.covered || self.right.covered;
+        let covered = self.left.covered || self.right.covered || self.is_lost;
         if covered && share * f64::from(self.width_px) > COVERED_SIGMA_PX {
             let got = self.left.used_share().min(self.right.used_share());
             return Err(Reject::NoPair { got, need: NEED_ROWS });

@@ -6,18 +6,29 @@ const SMOOTHER: [f64; 9] = [-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21
 const HALF: usize = 4;
 /// Excess that is believed, in standard deviations of its own doubt.
 const BELIEVED: f64 = 2.5;
+/// Places beyond the terms of their course that tell their scatter.
+const FEWEST_FREE: f64 = 3.0;
 
 /// By how much the variance of the mean of an edge's places is larger than
 /// that of independent ones: from what is left of them when a parabola through
 /// nine neighbours, the bead's own shape, is taken off, and from its
 /// correlation over neighbours. `variance` is what noise explains of a place;
 /// at least 1.
-pub fn inflation(places: &[Option<f64>], variance: f64, memory: &mut Vec<f64>) -> f64 {
+///
+/// `None` where gaps leave too few neighbours; see [`inflation_with_gaps`].
+pub fn inflation(
+    places: &[Option<f64>],
+    variance: f64,
+    memory: &mut Vec<f64>,
+) -> Option<f64> {
     memory.clear();
     memory.extend(places.windows(2 * HALF + 1).filter_map(left_over));
     let n = float(memory.len());
-    if memory.len() < 2 * HALF || variance <= 0.0 {
-        return 1.0;
+    if memory.len() < 2 * HALF {
+        return None;
+    }
+    if variance <= 0.0 {
+        return Some(1.0);
     }
     let product = |lag: usize| -> f64 {
         let pairs = memory.iter().zip(&memory[lag..]);
@@ -30,7 +41,7 @@ pub fn inflation(places: &[Option<f64>], variance: f64, memory: &mut Vec<f64>) -
     // that there are fewer of them than it seems.
     let doubt = (2.0 * 1.43 / n).sqrt();
     if ratio < 1.0 + BELIEVED * doubt {
-        return 1.0;
+        return Some(1.0);
     }
     // Covariance of a place with itself and with the next, before the
     // parabola was taken off: same = p₀c₀ + 2p₁c₁, next = p₁c₀ + (p₀ + p₂)c₁.
@@ -38,7 +49,33 @@ pub fn inflation(places: &[Option<f64>], variance: f64, memory: &mut Vec<f64>) -
     let under = passed[0] * both - 2.0 * passed[1] * passed[1];
     let itself = (both * same - 2.0 * passed[1] * next) / under;
     let with_next = (passed[0] * next - passed[1] * same) / under;
-    ((itself + 2.0 * with_next.max(0.0)) / variance).max(ratio)
+    Some(((itself + 2.0 * with_next.max(0.0)) / variance).max(ratio))
+}
+
+/// The same of places with gaps between them, from their distances to the
+/// course that was fitted to them with so many terms \[px\], each with its share
+/// of a band's rows. What the bead's own shape leaves counts as an error too:
+/// the gaps hide as much of it.
+pub fn inflation_with_gaps(
+    places: impl Iterator<Item = (f64, f64)>,
+    variance: f64,
+    terms: usize,
+) -> f64 {
+    let (mut square, mut n) = (0.0, 0.0);
+    for (off, share) in places {
+        square += share * off * off;
+        n += 1.0;
+    }
+    let free = n - float(terms);
+    if free < FEWEST_FREE || variance <= 0.0 {
+        return 1.0;
+    }
+    let ratio = square / (free * variance);
+    if ratio < 1.0 + BELIEVED * (2.0 / free).sqrt() {
+        return 1.0;
+    }
+    // So few do not tell their own scatter well: mean of its inverse.
+    ratio * free / (free - 2.0)
 }
 
 /// What the parabola leaves of the middle place; `None` where one is missing.
@@ -94,7 +131,7 @@ mod tests {
 
     fn found(values: &[f64]) -> f64 {
         let places: Vec<Option<f64>> = values.iter().copied().map(Some).collect();
-        inflation(&places, 1.0, &mut Vec::new())
+        inflation(&places, 1.0, &mut Vec::new()).unwrap()
     }
 
     #[test]
@@ -108,6 +145,19 @@ mod tests {
             *value += 8.0 * (float(k) / 8.0).sin();
         }
         assert_eq!(found(&wavy), 1.0);
+    }
+
+    #[test]
+    fn gaps_that_leave_no_neighbours_are_told_and_the_course_shows_the_scatter() {
+        let places: Vec<Option<f64>> =
+            white(3, 64).into_iter().enumerate().map(|(k, at)| (k % 5 < 2).then_some(at)).collect();
+        assert_eq!(inflation(&places, 1.0, &mut Vec::new()), None);
+        let of = |variance| {
+            inflation_with_gaps(places.iter().flatten().map(|&at| (at, 1.0)), variance, 2)
+        };
+        assert_eq!(of(1.0), 1.0);
+        let inflated = of(0.1);
+        assert!((inflated / 10.0 - 1.0).abs() < 0.5, "{inflated}");
     }
 
     #[test]
