@@ -30,7 +30,7 @@ const LEAST_SHARE: f64 = 0.4;
 /// Share of the rows from which each edge must come.
 const NEED_ROWS: f64 = 0.4;
 /// The same where each row is known to be clear.
-const NEED_CLEAR_ROWS: f64 = 0.1;
+const NEED_CLEAR_ROWS: f64 = 0.16;
 /// Share of saturated pixels from which missing contrast is laid to light.
 const MUCH_LIGHT: f64 = 0.3;
 /// Room that a search allows beyond the range of widths, for the difference
@@ -47,7 +47,7 @@ const OFF_PX: f64 = 0.3;
 const LINE_OFF_PX: f64 = 0.75;
 /// Largest standard deviation of a width whose edges are covered in part
 /// \[px\]: beyond it, what is left of an edge does not tell its course.
-const COVERED_SIGMA_PX: f64 = 0.22;
+const COVERED_SIGMA_PX: f64 = 0.19;
 /// Ground on either side of the bead that its noise is taken from \[px\].
 const BESIDE_PX: f32 = 12.0;
 /// Share by which the blur of one edge differs from the other's.
@@ -377,6 +377,9 @@ impl Work {
     fn sort_out(&mut self) -> Result<(), Reject> {
         let mut worst: f64 = 0.0;
         for side in [&mut self.left, &mut self.right] {
+            if side.covered {
+                side.drop_strays(self.least_off_px);
+            }
             let edges = side.edges_mut();
             worst = worst.max(outlier::sort_out(edges, self.least_off_px, &mut self.scatter));
         }

@@ -49,6 +49,8 @@ const NEEDED: (f32, f32) = (0.12, 12.0);
 const ELSEWHERE: f32 = 0.08;
 /// Distance from which on a row's edge is elsewhere \[px\].
 const ELSEWHERE_PX: f32 = 1.0;
+/// Share of an edge's places that may be strays.
+const MOST_STRAYS: f32 = 0.25;
 
 impl Tracer {
     /// Locates an edge from the rows that show it and nothing else. Returns
@@ -115,6 +117,32 @@ impl Tracer {
             && self.finish(table, scene)
             && self.misfit < CLEAR_FIT;
         self.covered || self.trace_again(table, scene, blur)
+    }
+
+    /// Takes out the few places that lie far from the course on which the others
+    /// agree: between gaps they have no neighbours that could tell. `least_px`
+    /// is the least distance that makes a stray. Where there are many, they stay,
+    /// and tell that the edge is unsure.
+    pub fn drop_strays(&mut self, least_px: f64) {
+        self.rough.clear();
+        let places = self.edges.iter();
+        self.rough.extend(places.map(|edge| edge.map_or(f32::NAN, |edge| narrow(edge.at))));
+        self.sorted.clear();
+        self.sorted.extend(self.edges.iter().flatten().map(|edge| narrow(edge.variance.sqrt())));
+        if self.sorted.is_empty() {
+            return;
+        }
+        let count = self.sorted.len();
+        let sigma = *self.sorted.select_nth_unstable_by(count / 2, f32::total_cmp).1;
+        let left = agree(&mut self.rough, narrow(least_px).max(MANY_SIGMA * sigma));
+        if float(count - left) > MOST_STRAYS * float(count) {
+            return;
+        }
+        for (edge, at) in self.edges.iter_mut().zip(&self.rough) {
+            if at.is_nan() {
+                *edge = None;
+            }
+        }
     }
 
     /// Locates the edge from its clear rows.
