@@ -172,6 +172,9 @@ impl Template {
                 } else {
                     fill_plain(part, shape, first);
                 }
+                if shape.flanks.any() {
+                    add_flanks(part, table, shape, first);
+                }
             }
         }
         self.products = products.mean();
@@ -321,6 +324,15 @@ fn fill_plain(part: &mut Part, shape: &Shape, first: f64) {
         let away = part.step[k].abs();
         part.step[k] = step + shading * away;
         part.mask[k] = if away <= extent { 1.0 } else { 0.0 };
+    }
+}
+
+/// Adds the tails of the steps beside the edge.
+#[cold]
+#[expect(clippy::cast_possible_truncation, reason = "shares of a step")]
+fn add_flanks(part: &mut Part, table: &StepTable, shape: &Shape, first: f64) {
+    for (k, step) in part.step.iter_mut().enumerate() {
+        *step += shape.flanks.at(table, first + float(k)) as f32;
     }
 }
 

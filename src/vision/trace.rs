@@ -445,10 +445,12 @@ impl Tracer {
     fn adopt(&mut self, shape: Shape) -> Shape {
         let Step { at, before, after, .. } = shape.step;
         let height = after - before;
+        let flanks = shape.flanks.about(at, height);
         self.course.adopt(narrow(at), (narrow(before), narrow(after)));
         Shape {
             step: Step { at: 0.0, before: 0.0, after: 1.0, ..shape.step },
             shading: (shape.shading.0 / height, shape.shading.1 / height),
+            flanks,
             variance: shape.variance / (height * height),
             ..shape
         }

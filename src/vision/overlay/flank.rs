@@ -1,0 +1,259 @@
+//! A step close beside an edge, such as that of a shadow: its tail reaches into
+//! the edge's own pixels, so that both are fitted together.
+
+use nalgebra::SVector;
+
+use super::Overlay;
+use super::shape::{Extent, Look, MAX_STEPS, SHADING_SD, Step, place_limit};
+use crate::vision::normal::Normal;
+use crate::vision::step::StepTable;
+
+/// Unknowns: place, blur, levels and shading of the edge, then place, height and
+/// blur of what lies before it and after it.
+const UNKNOWNS: usize = 12;
+/// Number of the first unknown of a flank on either side.
+const FLANKS: [usize; 2] = [6, 9];
+/// Farthest that a flank is fitted, in blurs: from there on its tail is nothing.
+const NEAR_BLURS: f64 = 7.0;
+/// Samples beyond a flank that tell its course, in blurs.
+const BEYOND_BLURS: f64 = 2.0;
+/// Share of the edge's blur by which a flank's usually differs.
+const OTHER_BLUR: f64 = 0.5;
+/// Samples up to so many blurs before the flank are used for the edge.
+const SPARED_BLURS: f64 = 1.0;
+/// By how much the fit with flanks may leave more than the one without \[shares
+/// of the step\].
+const WORSE: f64 = 0.01;
+/// Weight that holds an unknown.
+const FIXED: f64 = 1e12;
+
+/// A step beside the edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flank {
+    /// Its place, beside the path \[px\].
+    pub at: f64,
+    /// What it adds to the level beyond it, in shares of the edge's step.
+    pub height: f64,
+    /// Its blur \[px\].
+    pub blur: f64,
+}
+
+impl Flank {
+    /// What it adds to the level at a place, and the derivatives of that by
+    /// place, height and blur. `sign` is −1 for one before the edge, 1 for one
+    /// after it.
+    #[inline(always)]
+    fn reaches(&self, table: &StepTable, at: f64, sign: f64) -> (f64, [f64; 3]) {
+        let z = sign * (at - self.at) / self.blur;
+        let (share, density) = table.at(z);
+        let per_px = self.height * density / self.blur;
+        (self.height * share, [-sign * per_px, share, -z * per_px])
+    }
+}
+
+/// The steps beside an edge: before it and after it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Flanks(pub [Option<Flank>; 2]);
+
+impl Flanks {
+    /// Whether there are any.
+    pub fn any(&self) -> bool {
+        self.0.iter().any(Option::is_some)
+    }
+
+    /// What they add to the level at a place beside the path, in shares of the
+    /// step.
+    pub fn at(&self, table: &StepTable, at: f64) -> f64 {
+        let one = |(flank, sign): (&Option<Flank>, f64)| {
+            flank.as_ref().map_or(0.0, |flank| flank.reaches(table, at, sign).0)
+        };
+        self.0.iter().zip([-1.0, 1.0]).map(one).sum()
+    }
+
+    /// The same flanks about an edge that lies at a place beside the path and
+    /// has another step, of which the given one is a share.
+    pub fn about(&self, at: f64, share: f64) -> Self {
+        let moved = |flank: Flank| Flank {
+            at: flank.at - at,
+            height: flank.height / share,
+            ..flank
+        };
+        Self(self.0.map(|flank| flank.map(moved)))
+    }
+
+    /// Only those near enough to an edge to reach into its pixels.
+    pub fn near(&self, step: &Step) -> Self {
+        let near = |flank: &Flank| (flank.at - step.at).abs() < NEAR_BLURS * step.blur;
+        Self(self.0.map(|flank| flank.filter(near)))
+    }
+}
+
+impl Overlay {
+    /// Fits an edge and the steps beside it. `start` has rough ones, and the
+    /// edge as it was fitted without them. `None` where that is no better.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn fit_flanks(
+        &self,
+        table: &StepTable,
+        start: &Look,
+        known: Option<(f64, f64)>,
+    ) -> Option<Look> {
+        let mut look = *start;
+        for _ in 0..MAX_STEPS {
+            let (mut normal, _) = self.linearise_flanks(table, &look);
+            hold(&mut normal, &look, known);
+            let solved = normal.solve()?;
+            let moved = follow(&mut look, &solved.unknowns);
+            if moved < 1e-3 {
+                break;
+            }
+        }
+        let (mut normal, misfit) = self.linearise_flanks(table, &look);
+        hold(&mut normal, &look, known);
+        look.noise = look.pixel_noise.max(misfit.sqrt());
+        let solved = normal.solve()?;
+        look.blur_sd = look.noise * solved.variance(1).max(0.0).sqrt();
+        look.doubt = look.noise * look.noise * doubt(&mut normal)?;
+        look.room = spared(&look);
+        let share = (used(misfit, &look), used(start.noise * start.noise, start));
+        (is_sound(&look, start) && share.0 <= share.1 + WORSE).then_some(look)
+    }
+
+    /// Normal equations about an edge and its flanks, and the mean square of
+    /// what they leave.
+    fn linearise_flanks(&self, table: &StepTable, look: &Look) -> (Normal<UNKNOWNS>, f64) {
+        let Look { step: edge, shading, flanks, .. } = look;
+        let Extent { before: from, after: to } = reach(look);
+        let height = edge.after - edge.before;
+        let mut normal = Normal::default();
+        let (mut square, mut n) = (0.0, -9.0);
+        for (at, value, weight) in self.samples(-from, to) {
+            let z = (at - edge.at) / edge.blur;
+            let (step, density) = table.at(z);
+            let depth = [density - z * (1.0 - step), density + z * step].map(|d| d * edge.blur);
+            let slope = height * density / edge.blur;
+            let mut row = [0.0; UNKNOWNS];
+            row[..6].copy_from_slice(&[
+                -slope,
+                -slope * z,
+                1.0 - step,
+                step,
+                depth[0],
+                depth[1],
+            ]);
+            let mut miss = value
+                - edge.before * (1.0 - step)
+                - edge.after * step
+                - shading[0] * depth[0]
+                - shading[1] * depth[1];
+            for ((flank, sign), first) in flanks.0.iter().zip([-1.0, 1.0]).zip(FLANKS) {
+                let Some(flank) = flank else { continue };
+                let (adds, slopes) = flank.reaches(table, at, sign);
+                miss -= adds;
+                row[first..first + 3].copy_from_slice(&slopes);
+            }
+            square += weight * miss * miss;
+            n += 1.0;
+            normal.add(row, miss, weight);
+        }
+        (normal, square / f64::max(n, 1.0))
+    }
+}
+
+/// Farthest samples on either side \[px\].
+fn reach(look: &Look) -> Extent {
+    let Look { step, room, flanks, .. } = look;
+    let plain = 4.5 * step.blur + 2.0;
+    let of = |flank: &Option<Flank>, room: f64| match flank {
+        Some(flank) => (flank.at.abs() + BEYOND_BLURS * flank.blur).min(place_limit()),
+        None => plain.min(room).min(place_limit()),
+    };
+    Extent { before: of(&flanks.0[0], room.before), after: of(&flanks.0[1], room.after) }
+}
+
+/// Holds what is known, and unknowns that there are not.
+fn hold(normal: &mut Normal<UNKNOWNS>, look: &Look, known: Option<(f64, f64)>) {
+    let weight = |sd: f64| (look.noise / sd).powi(2);
+    normal.hold(4, weight(SHADING_SD), -look.shading[0]);
+    normal.hold(5, weight(SHADING_SD), -look.shading[1]);
+    if let Some((mean, sd)) = known {
+        normal.hold(1, weight(sd), mean - look.step.blur);
+    }
+    for (flank, first) in look.flanks.0.iter().zip(FLANKS) {
+        match flank {
+            Some(flank) => {
+                let usual = weight(OTHER_BLUR * look.step.blur);
+                normal.hold(first + 2, usual, look.step.blur - flank.blur);
+            }
+            None => (first..first + 3).for_each(|which| normal.hold(which, FIXED, 0.0)),
+        }
+    }
+}
+
+/// Takes a step of the fit; returns how far the edge moved \[px\].
+fn follow(look: &mut Look, moved: &SVector<f64, UNKNOWNS>) -> f64 {
+    let step = look.step;
+    let most = 0.5 * step.blur;
+    look.step = Step {
+        at: step.at + moved[0].clamp(-most, most),
+        blur: (step.blur + moved[1].clamp(-0.5 * most, 0.5 * most)).max(0.3),
+        before: step.before + moved[2],
+        after: step.after + moved[3],
+    };
+    look.shading[0] += moved[4];
+    look.shading[1] += moved[5];
+    for (flank, first) in look.flanks.0.iter_mut().zip(FLANKS) {
+        let Some(flank) = flank else { continue };
+        flank.at += moved[first].clamp(-most, most);
+        flank.height += moved[first + 1];
+        flank.blur = (flank.blur + moved[first + 2].clamp(-0.5 * most, 0.5 * most)).max(0.3);
+    }
+    moved[0].abs() + moved[1].abs()
+}
+
+/// What the blur and the flanks add to the variance of the edge's place, for
+/// samples of variance 1 \[px²\].
+fn doubt(normal: &mut Normal<UNKNOWNS>) -> Option<f64> {
+    // Doubt about shading counts where it shows, not wherever it may be.
+    normal.hold(4, FIXED, 0.0);
+    normal.hold(5, FIXED, 0.0);
+    let all = normal.solve()?.variance(0);
+    normal.hold(1, FIXED, 0.0);
+    for which in FLANKS[0]..UNKNOWNS {
+        normal.hold(which, FIXED, 0.0);
+    }
+    Some((all - normal.solve()?.variance(0)).max(0.0))
+}
+
+/// The samples that the edge is located from.
+fn spared(look: &Look) -> Extent {
+    let of = |flank: &Option<Flank>, room: f64| {
+        flank.as_ref().map_or(room, |flank| {
+            ((flank.at - look.step.at).abs() - SPARED_BLURS * flank.blur).max(look.step.blur)
+        })
+    };
+    let Flanks([before, after]) = &look.flanks;
+    Extent { before: of(before, look.room.before), after: of(after, look.room.after) }
+}
+
+/// What a fit leaves, in shares of its own step.
+fn used(square: f64, look: &Look) -> f64 {
+    square.sqrt() / (look.step.after - look.step.before).abs()
+}
+
+/// Whether the edge is still the one that was looked at, and the flanks lie
+/// beside it.
+fn is_sound(look: &Look, start: &Look) -> bool {
+    let step = look.step;
+    let beside = |(flank, sign): (&Option<Flank>, f64)| {
+        flank.is_none_or(|flank| {
+            sign * (flank.at - step.at) > 1.5 * step.blur
+                && flank.blur < 3.0 * step.blur
+                && flank.height.is_finite()
+        })
+    };
+    (step.at - start.step.at).abs() < start.step.blur
+        && step.after - step.before > 0.1
+        && look.flanks.0.iter().zip([-1.0, 1.0]).all(beside)
+}

@@ -1,0 +1,403 @@
+//! The shape of an edge, from its overlay: place, blur and levels, how far its
+//! surroundings on either side are plain, and how they are shaded.
+
+use super::flank::{Flank, Flanks};
+use super::{Overlay, PHASES, REACH, ROUNDING, SPAN, place};
+use crate::vision::line::Line;
+use crate::vision::normal::Normal;
+use crate::vision::step::StepTable;
+
+const LEAST_BLUR_PX: f64 = 0.3;
+const MOST_BLUR_PX: f64 = 15.0;
+pub const MAX_STEPS: usize = 16;
+/// A step \[px, or blurs\] after which another would change next to nothing: each
+/// squares what is left.
+const CONVERGED: f64 = 2e-3;
+/// Shading that is usual close to an edge, as a standard deviation \[1/px\].
+pub const SHADING_SD: f64 = 0.02;
+
+/// Samples that are free of anything but this edge, on either side \[px\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Towards smaller places.
+    pub before: f64,
+    /// Towards larger ones.
+    pub after: f64,
+}
+
+/// A blurred step, its levels in shares of the step that was given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// How far it lies from the path \[px\].
+    pub at: f64,
+    /// Blur as the standard deviation of a Gaussian \[px\], integration over
+    /// pixels included.
+    pub blur: f64,
+    /// Level before it.
+    pub before: f64,
+    /// Level after it.
+    pub after: f64,
+}
+
+/// A first look at an edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// The step.
+    pub step: Step,
+    /// Standard deviation of its blur \[px\].
+    pub blur_sd: f64,
+    /// Change of the level before and after it \[1/px away from it\].
+    pub(super) shading: [f64; 2],
+    /// Standard deviation of a pixel, in shares of the step.
+    pub(super) pixel_noise: f64,
+    /// Standard deviation of a row's samples about the step, in shares of it.
+    pub(super) noise: f64,
+    /// How far there is nothing but this edge.
+    pub room: Extent,
+    /// Steps beside it that reach into its pixels.
+    pub(super) flanks: Flanks,
+    /// What they and the blur add to the variance of its place \[px²\]; 0 where
+    /// there are none.
+    pub(super) doubt: f64,
+}
+
+impl Look {
+    /// Samples beside the edge on either side: distances of the nearest and the
+    /// farthest \[px\].
+    pub fn beside(&self) -> [(usize, usize); 2] {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "within the window"
+        )]
+        let whole = |distance: f64| distance.max(0.0) as usize;
+        let near = 3.0 * self.step.blur + 1.0;
+        let to = |room: f64| whole(room).min(REACH);
+        [
+            (whole((near - self.step.at).ceil()), to(self.room.before)),
+            (whole((near + self.step.at).ceil()), to(self.room.after)),
+        ]
+    }
+
+    /// The same look up to half-way to the steps beside the edge.
+    fn without_flanks(&self) -> Self {
+        let half = |flank: &Option<Flank>, room: f64| {
+            flank.as_ref().map_or(room, |flank| 0.5 * (flank.at - self.step.at).abs())
+        };
+        let Flanks([before, after]) = &self.flanks;
+        let room =
+            Extent { before: half(before, self.room.before), after: half(after, self.room.after) };
+        Self { room, flanks: Flanks::default(), doubt: 0.0, ..*self }
+    }
+
+    /// The same look where texture makes samples less sure than noise does:
+    /// `noise` is what independent ones as unsure would have.
+    pub fn in_texture(self, noise: f64) -> Self {
+        let blur_sd = self.blur_sd * (noise / self.noise).max(1.0);
+        Self { blur_sd, pixel_noise: noise, noise: noise.max(self.noise), ..self }
+    }
+}
+
+/// An edge as the overlay shows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shape {
+    /// The step.
+    pub step: Step,
+    /// How far the surroundings are plain, and what is used of them.
+    pub extent: Extent,
+    /// Change of the level for each pixel away from the edge, before and after
+    /// it, in shares of the step \[1/px\].
+    pub shading: (f64, f64),
+    /// Steps beside the edge that reach into its pixels, in shares of its own.
+    pub flanks: Flanks,
+    /// Variance of the edge's position that doubt about the shading and about
+    /// flanks leaves \[px²\].
+    pub variance: f64,
+}
+
+impl Overlay {
+    /// Looks at the edge. `noise` is the standard deviation of a pixel as a
+    /// share of the step, `room` how far to look. `None` where no step can be
+    /// fitted.
+    #[inline(always)]
+    pub fn look(&self, table: &StepTable, noise: f64, room: Extent) -> Option<Look> {
+        let (slope, at) = self.steepest(room)?;
+        let blur = (0.2 / slope).clamp(0.5, MOST_BLUR_PX);
+        let step = Step { at, blur, before: 0.0, after: 1.0 };
+        let (room, flanks) = self.up_to_neighbours(step, noise, room);
+        let look = Look {
+            step,
+            blur_sd: f64::INFINITY,
+            shading: [0.0; 2],
+            pixel_noise: noise,
+            noise,
+            room,
+            flanks: Flanks::default(),
+            doubt: 0.0,
+        };
+        let mut look = self.fit(table, look, None)?;
+        let flanks = flanks.near(&look.step);
+        if flanks.any() {
+            let start = Look { flanks, ..look };
+            look = self.fit_flanks(table, &start, None).unwrap_or(look);
+        }
+        Some(look)
+    }
+
+    /// How far the surroundings on one side of a known step are plain \[px\],
+    /// after it or before it, their slope in shares of the step that was given
+    /// \[1/px away from it\], and the variance that its doubt leaves to the
+    /// level at the edge.
+    pub fn beside(
+        &self,
+        table: &StepTable,
+        look: &Look,
+        step: &Step,
+        after: bool,
+    ) -> (f64, (f64, f64)) {
+        let (sign, room) = if after { (1.0, look.room.after) } else { (-1.0, look.room.before) };
+        let (extent, line) = self.plain(table, (step, &look.flanks), look.pixel_noise, sign, room);
+        (extent, line.sure_slope(look.pixel_noise))
+    }
+
+    /// Reads the edge's shape from a look at it and what is known of its blur:
+    /// mean and standard deviation \[px\].
+    #[inline(always)]
+    pub fn shape(&self, table: &StepTable, look: &Look, blur: (f64, f64)) -> Option<Shape> {
+        let look = self.fit_known(table, look, blur)?;
+        let Look { step, noise, room, flanks, doubt, .. } = look;
+        let sharp = step.blur * step.blur - ROUNDING;
+        let step = Step { blur: sharp.max(LEAST_BLUR_PX.powi(2)).sqrt(), ..step };
+        let (before, line_before) = self.plain(table, (&step, &flanks), noise, -1.0, room.before);
+        let (after, line_after) = self.plain(table, (&step, &flanks), noise, 1.0, room.after);
+        let ((slope_before, doubt_before), (slope_after, doubt_after)) =
+            (line_before.sure_slope(look.pixel_noise), line_after.sure_slope(look.pixel_noise));
+        // A level that is off by a share moves the edge by √π blurs times it.
+        let per_level = std::f64::consts::PI * step.blur * step.blur;
+        Some(Shape {
+            step,
+            extent: Extent { before, after },
+            shading: (slope_before, slope_after),
+            flanks,
+            variance: per_level * (doubt_before + doubt_after) + doubt,
+        })
+    }
+
+    /// Fits the edge again with what is known of its blur.
+    #[inline(always)]
+    fn fit_known(&self, table: &StepTable, look: &Look, blur: (f64, f64)) -> Option<Look> {
+        if !look.flanks.any() {
+            return self.fit(table, *look, Some(blur));
+        }
+        let fitted = self.fit_flanks(table, look, Some(blur));
+        fitted.or_else(|| self.fit(table, look.without_flanks(), Some(blur)))
+    }
+
+    /// Steepest slope of the overlay near the path \[1/px\], and where.
+    #[inline(always)]
+    fn steepest(&self, room: Extent) -> Option<(f64, f64)> {
+        let (from, to) = (halves(-room.before.min(8.0)), halves(room.after.min(8.0)));
+        let mut best = (0.0, 0);
+        for half in from..=to {
+            let slope = self.slope(half);
+            if slope > best.0 {
+                best = (slope, half);
+            }
+        }
+        (best.0 > 0.01).then_some((f64::from(best.0), f64::from(best.1) / 2.0))
+    }
+
+    /// Mean slope over two pixels about a distance in half pixels, of both
+    /// phases \[1/px\].
+    #[inline(always)]
+    fn slope(&self, half: i16) -> f32 {
+        let (mut sum, mut n) = (0.0, 0.0);
+        let middle = i16::try_from(REACH).unwrap_or(0);
+        for (phase, mean) in (0i16..).zip(&self.mean) {
+            let weight = self.counts[usize::from(phase.unsigned_abs())];
+            // The nearest sample, of two as near the one farther out.
+            let twice = half + phase;
+            let k = i16::midpoint(twice, twice.signum()) + middle;
+            let k = usize::try_from(k).unwrap_or(0).clamp(1, SPAN - 2);
+            sum += weight * 0.5 * (mean[k + 1] - mean[k - 1]);
+            n += weight;
+        }
+        sum / n.max(1.0)
+    }
+
+    /// Cuts the room off half-way to a neighbouring step: where the slope has
+    /// fallen off and rises again, in either direction. Tells the steps too,
+    /// roughly.
+    #[inline(always)]
+    fn up_to_neighbours(&self, start: Step, noise: f64, room: Extent) -> (Extent, Flanks) {
+        let noise = noise / (2.0 * self.used().max(1.0)).sqrt();
+        let (before, flank_before) = self.up_to_neighbour(start, noise, (-1, room.before));
+        let (after, flank_after) = self.up_to_neighbour(start, noise, (1, room.after));
+        (Extent { before, after }, Flanks([flank_before, flank_after]))
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "a slope needs no more")]
+    #[inline(always)]
+    fn up_to_neighbour(
+        &self,
+        start: Step,
+        noise: f64,
+        (sign, room): (i16, f64),
+    ) -> (f64, Option<Flank>) {
+        let notable = (5.0 * noise).max(0.06 / start.blur.max(1.0)) as f32;
+        let first = (0.5 * start.blur).clamp(0.5, 3.0);
+        let mut lowest = (f32::INFINITY, room);
+        let from = halves(start.at + f64::from(sign) * first);
+        let last = halves(room - 1.0 - first);
+        for step in 0..last {
+            let slope = self.slope(from + sign * step).abs();
+            if slope < lowest.0 {
+                lowest = (slope, first + f64::from(step) / 2.0);
+            }
+            if slope > lowest.0 + notable {
+                return (lowest.1, self.flank(start.blur, (from, sign, step..last)));
+            }
+        }
+        (room, None)
+    }
+
+    /// The step whose slope rises from a place on, in half pixels.
+    #[cold]
+    fn flank(
+        &self,
+        blur: f64,
+        (from, sign, steps): (i16, i16, std::ops::Range<i16>),
+    ) -> Option<Flank> {
+        let mut best = (0.0f32, 0, 0.0f32);
+        for step in steps {
+            let half = from + sign * step;
+            let slope = self.slope(half);
+            if slope.abs() < 0.7 * best.0 {
+                break;
+            }
+            if slope.abs() > best.0 {
+                best = (slope.abs(), half, slope);
+            }
+        }
+        let (_, half, slope) = best;
+        let height = f64::from(sign) * f64::from(slope) * blur * std::f64::consts::TAU.sqrt();
+        (half != 0).then_some(Flank { at: f64::from(half) / 2.0, height, blur })
+    }
+
+    /// Fits place, blur, levels and a little shading about the edge.
+    #[inline(always)]
+    fn fit(&self, table: &StepTable, start: Look, known: Option<(f64, f64)>) -> Option<Look> {
+        let mut look = start;
+        // Shading is held near none, because over a short way it could pass
+        // for a shift of the edge.
+        for _ in 0..MAX_STEPS {
+            let Look { step, noise, .. } = look;
+            let (mut normal, misfit) = self.linearise(table, &look);
+            let hold = |noise: f64, sd: f64| (noise / sd).powi(2);
+            normal.hold(4, hold(start.pixel_noise, SHADING_SD), -look.shading[0]);
+            normal.hold(5, hold(start.pixel_noise, SHADING_SD), -look.shading[1]);
+            if let Some((mean, sd)) = known {
+                normal.hold(1, hold(noise, sd), mean - step.blur);
+            }
+            let solved = normal.solve()?;
+            let moved = solved.unknowns;
+            // What the model leaves is noise, if not of the pixels.
+            look.noise = start.pixel_noise.max(misfit.sqrt());
+            look.step = Step {
+                at: step.at + moved[0].clamp(-step.blur, step.blur),
+                blur: (step.blur + moved[1].clamp(-0.5 * step.blur, 0.5 * step.blur))
+                    .clamp(LEAST_BLUR_PX, MOST_BLUR_PX),
+                before: step.before + moved[2],
+                after: step.after + moved[3],
+            };
+            look.shading[0] += moved[4];
+            look.shading[1] += moved[5];
+            look.blur_sd = look.noise * solved.variance(1).max(0.0).sqrt();
+            if moved[0].abs() < CONVERGED && moved[1].abs() < CONVERGED * step.blur {
+                break;
+            }
+        }
+        let inside = look.step.at > -look.room.before && look.step.at < look.room.after;
+        (inside && look.step.after - look.step.before > 0.1).then_some(look)
+    }
+
+    /// Normal equations about a step, and the mean square of what it leaves,
+    /// for a sample of weight 1.
+    #[inline(always)]
+    fn linearise(&self, table: &StepTable, look: &Look) -> (Normal<6>, f64) {
+        let Look { step: edge, room, shading, .. } = *look;
+        let reach = 4.5 * edge.blur + 2.0;
+        let from = (edge.at - reach.min(room.before)).max(-place_limit());
+        let to = (edge.at + reach.min(room.after)).min(place_limit());
+        let height = edge.after - edge.before;
+        let mut normal = Normal::<6>::default();
+        let (mut square, mut n) = (0.0, -6.0);
+        for (distance, value, weight) in self.samples(from, to) {
+            let z = (distance - edge.at) / edge.blur;
+            let (step, density) = table.at(z);
+            let depth = [density - z * (1.0 - step), density + z * step].map(|d| d * edge.blur);
+            let slope = height * density / edge.blur;
+            let miss = value
+                - edge.before * (1.0 - step)
+                - edge.after * step
+                - shading[0] * depth[0]
+                - shading[1] * depth[1];
+            square += weight * miss * miss;
+            n += 1.0;
+            let row = [-slope, -slope * z, 1.0 - step, step, depth[0], depth[1]];
+            normal.add(row, miss, weight);
+        }
+        (normal, square / f64::max(n, 1.0))
+    }
+
+    /// How far from the edge a side is plain, that is a straight line within
+    /// what noise explains, and that line.
+    #[inline(always)]
+    fn plain(
+        &self,
+        table: &StepTable,
+        (shape, flanks): (&Step, &Flanks),
+        noise: f64,
+        sign: f64,
+        room: f64,
+    ) -> (f64, Line) {
+        let height = shape.after - shape.before;
+        let first = 3.0 * shape.blur;
+        let mut line = Line::default();
+        let mut end = first.min(room);
+        while end + 2.0 <= room {
+            let mut block = Line::default();
+            let (near, far) = (shape.at + sign * end, shape.at + sign * (end + 2.0));
+            for (distance, value, weight) in self.samples(near.min(far), near.max(far) - 1e-9) {
+                let (step, _) = table.at((distance - shape.at) / shape.blur);
+                let beside = if flanks.any() { flanks.at(table, distance) } else { 0.0 };
+                let miss = value - beside - shape.before - height * step;
+                block.add(sign * (distance - shape.at), miss, weight);
+            }
+            if block.weight <= 0.0 {
+                break;
+            }
+            let (expected, variance) = line.at(block.middle());
+            let off = block.mean() - expected;
+            let doubt = noise * noise * (variance + 1.0 / block.weight);
+            // The first few pixels show the slope.
+            if line.shows_slope() && off.abs() > 4.0 * doubt.sqrt() + 0.006 * height {
+                break;
+            }
+            line.join(&block);
+            end += 2.0;
+        }
+        (end, line)
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "the window is short")]
+pub fn place_limit() -> f64 {
+    REACH as f64 - 1.0
+}
+
+/// A distance in half pixels.
+#[expect(clippy::cast_possible_truncation, reason = "the window is short")]
+fn halves(distance: f64) -> i16 {
+    (2.0 * distance).round() as i16
+}
