@@ -16,11 +16,7 @@ const FEWEST_FREE: f64 = 3.0;
 /// at least 1.
 ///
 /// `None` where gaps leave too few neighbours; see [`inflation_with_gaps`].
-pub fn inflation(
-    places: &[Option<f64>],
-    variance: f64,
-    memory: &mut Vec<f64>,
-) -> Option<f64> {
+pub fn inflation(places: &[Option<f64>], variance: f64, memory: &mut Vec<f64>) -> Option<f64> {
     memory.clear();
     memory.extend(places.windows(2 * HALF + 1).filter_map(left_over));
     let n = float(memory.len());

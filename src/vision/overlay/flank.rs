@@ -73,11 +73,8 @@ impl Flanks {
     /// The same flanks about an edge that lies at a place beside the path and
     /// has another step, of which the given one is a share.
     pub fn about(&self, at: f64, share: f64) -> Self {
-        let moved = |flank: Flank| Flank {
-            at: flank.at - at,
-            height: flank.height / share,
-            ..flank
-        };
+        let moved =
+            |flank: Flank| Flank { at: flank.at - at, height: flank.height / share, ..flank };
         Self(self.0.map(|flank| flank.map(moved)))
     }
 
@@ -134,14 +131,7 @@ impl Overlay {
             let depth = [density - z * (1.0 - step), density + z * step].map(|d| d * edge.blur);
             let slope = height * density / edge.blur;
             let mut row = [0.0; UNKNOWNS];
-            row[..6].copy_from_slice(&[
-                -slope,
-                -slope * z,
-                1.0 - step,
-                step,
-                depth[0],
-                depth[1],
-            ]);
+            row[..6].copy_from_slice(&[-slope, -slope * z, 1.0 - step, step, depth[0], depth[1]]);
             let mut miss = value
                 - edge.before * (1.0 - step)
                 - edge.after * step

@@ -13,6 +13,9 @@ pub const MAX_STEPS: usize = 16;
 /// A step \[px, or blurs\] after which another would change next to nothing: each
 /// squares what is left.
 const CONVERGED: f64 = 2e-3;
+/// Slope that shows another step beside the edge, times the blur: a tenth of
+/// what the edge itself has.
+const NOTABLE: f64 = 0.04;
 /// Shading that is usual close to an edge, as a standard deviation \[1/px\].
 pub const SHADING_SD: f64 = 0.02;
 
@@ -244,7 +247,7 @@ impl Overlay {
         noise: f64,
         (sign, room): (i16, f64),
     ) -> (f64, Option<Flank>) {
-        let notable = (5.0 * noise).max(0.06 / start.blur.max(1.0)) as f32;
+        let notable = (5.0 * noise).max(NOTABLE / start.blur.max(1.0)) as f32;
         let first = (0.5 * start.blur).clamp(0.5, 3.0);
         let mut lowest = (f32::INFINITY, room);
         let from = halves(start.at + f64::from(sign) * first);
