@@ -51,7 +51,7 @@ fn gauge(axis: Axis, method: Method) -> Gauge {
 }
 
 fn scale() -> Calibration {
-    Calibration::Scale { mm_per_px: MM_PER_PX }
+    Calibration::Scale { mm_per_px: MM_PER_PX, sigma: None }
 }
 
 /// Different frames, the bead of each a little wider and further to the right.

@@ -43,7 +43,7 @@ fn picture(bencher: Bencher<'_, '_>, name: &str) {
         calipers: 64,
         min_contrast_grey: 6.0,
     };
-    let scale = Calibration::Scale { mm_per_px: 0.126_582 };
+    let scale = Calibration::Scale { mm_per_px: 0.126_582, sigma: None };
     let renderer = Renderer::new(scale, Mm::ZERO, gauge, disturbed(name), 1).expect("a sound cell");
     let bead = |_: f64| Some((-21.0, 21.0));
     bencher.bench_local(|| renderer.render(0, Stamp::START, None, &bead).expect("a picture"));

@@ -18,7 +18,7 @@ const CELL: &str = include_str!("../cells/barjuei2022.toml");
 fn layer() -> f64 {
     let cell = Cell::parse(Path::new("barjuei2022.toml"), CELL, Purpose::Run).expect("sound");
     let run = cell.run.clone().expect("read for a run");
-    let scale = Calibration::Scale { mm_per_px: 0.126_582 };
+    let scale = Calibration::Scale { mm_per_px: 0.126_582, sigma: None };
     let mut sim = SimCell::new(&cell, &run, scale, NoRecorder).expect("a sound cell");
     sim.layer(Mm::ZERO, &mut Deaf).took.secs()
 }

@@ -43,6 +43,9 @@ fn the_camera_of_the_real_pictures_is_found() {
     let calibration = calibration_file::read(&out).unwrap();
     let Calibration::Full { camera, quality, .. } = &calibration else { unreachable!() };
     assert!(quality.unwrap().reprojection_rms_px <= 0.20);
+    let share = quality.unwrap().width_sigma_share.unwrap();
+    assert!((1e-4..3e-3).contains(&share), "{share}");
+    assert!(said.contains("a width on the bed is known to"), "{said}");
     // The focal length that OpenCV's own samples give for these pictures.
     assert!((camera.focal_px[0] - 532.83).abs() < 0.8, "fx {}", camera.focal_px[0]);
     assert!((camera.centre_px[0] - 342.5).abs() < 1.5 && (camera.centre_px[1] - 233.9).abs() < 1.5);

@@ -53,3 +53,31 @@ target_width_mm = 42.0
     assert_eq!(cell.target.unwrap().get(), 42.0);
     assert_eq!(cell.calibration, CalibrationSource::File("x/calib/cell.toml".into()));
 }
+
+#[test]
+fn a_single_scale_may_have_a_standard_deviation_smaller_than_itself() {
+    let text = fs::read_to_string(root().join("cells/process.toml")).unwrap();
+    let with = |line: &str| {
+        let text = text.replace("[calibration]", &format!("[calibration]\n{line}"));
+        Cell::parse(Path::new("cell.toml"), &text, Purpose::Measure)
+    };
+    for (line, expected) in [("", None), ("mm_per_px_sigma = 0.0002", Some(0.0002))] {
+        let CalibrationSource::Scale { sigma, .. } = with(line).unwrap().calibration else {
+            unreachable!()
+        };
+        assert_eq!(sigma, expected);
+    }
+    for (found, expected) in [
+        ("-0.001", "expected a number from 0 to 1000"),
+        ("nan", "expected a number from 0 to 1000"),
+        ("0.126582", "expected less than mm_per_px"),
+    ] {
+        let said = with(&format!("mm_per_px_sigma = {found}")).unwrap_err().to_string();
+        let line = format!("calibration.mm_per_px_sigma: found {found}, {expected}");
+        assert!(said.contains(&line), "no \"{line}\" in\n{said}");
+    }
+    let of_a_file =
+        text.replace("mm_per_px = 0.126582", "file = \"a.toml\"\nmm_per_px_sigma = 0.1");
+    let said = Cell::parse(Path::new("cell.toml"), &of_a_file, Purpose::Measure).unwrap_err();
+    assert!(said.to_string().contains("expected mm_per_px beside it"), "{said}");
+}

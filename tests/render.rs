@@ -7,13 +7,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use truebead::calib::Calibration;
+use truebead::calib::{Calibration, Quality};
 use truebead::config::Cell;
 use truebead::config::cell::{CalibrationSource, Purpose};
 use truebead::io::calibration_file;
 use truebead::sim::picture::{Motion, Side, Spots};
 use truebead::sim::scenario::Series;
-use truebead::vision::Measurer;
+use truebead::vision::{Measurer, Method, WidthMeasurement};
 
 const FOLDERS: [&str; 3] = ["straight", "tilted", "dark"];
 
@@ -27,7 +27,9 @@ fn scenario(name: &str) -> (Cell, Calibration) {
     let cell = Cell::parse(&path, &text, Purpose::Measure).unwrap();
     let calibration = match &cell.calibration {
         CalibrationSource::File(path) => calibration_file::read(path).unwrap(),
-        CalibrationSource::Scale(mm_per_px) => Calibration::Scale { mm_per_px: *mm_per_px },
+        CalibrationSource::Scale { mm_per_px, sigma } => {
+            Calibration::Scale { mm_per_px: *mm_per_px, sigma: *sigma }
+        }
     };
     (cell, calibration)
 }
@@ -88,6 +90,26 @@ fn measured_widths_are_those_of_the_bead() {
         eprintln!("{name}: bias {mean:.5} mm, RMS {spread:.5} mm, {sigmas:.2} sigma");
         assert!(spread < bearable_mm, "{name}: {spread}");
         assert!(mean.abs() < 4.0 * spread / n.sqrt(), "{name}: bias {mean} of {spread}");
+    }
+}
+
+#[test]
+fn the_calibrations_share_is_in_the_sigma_of_each_width_and_in_nothing_else() {
+    const SHARE: f64 = 0.002;
+    let (mut cell, calibration) = scenario("tilted");
+    let mut told = calibration.clone();
+    let Calibration::Full { quality, .. } = &mut told else { unreachable!() };
+    *quality = Some(Quality { reprojection_rms_px: 0.2, width_sigma_share: Some(SHARE) });
+    let frame = Series::new(&cell, calibration.clone()).unwrap().render(0).unwrap().frame;
+    for method in [Method::Caliper, Method::EdgeLines] {
+        cell.gauge.method = method;
+        let [without, with] = [&calibration, &told].map(|calibration| {
+            let surface = calibration.surface(cell.surface_height, None);
+            Measurer::new(cell.gauge, None).measure(&frame, &surface).unwrap()
+        });
+        let expected = without.sigma.get().hypot(SHARE * without.width.get());
+        assert!((with.sigma.get() / expected - 1.0).abs() < 1e-12, "{method:?}");
+        assert_eq!(WidthMeasurement { sigma: without.sigma, ..with }, without);
     }
 }
 

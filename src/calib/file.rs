@@ -21,6 +21,8 @@ const DISTORTION: std::ops::RangeInclusive<f64> = -1e6..=1e6;
 const TURN_RAD: std::ops::RangeInclusive<f64> = -6.3..=6.3;
 const LENGTH_MM: std::ops::RangeInclusive<f64> = -1e6..=1e6;
 const RMS_PX: std::ops::RangeInclusive<f64> = 0.0..=1e3;
+/// A calibration that leaves more than the width itself open is none.
+const SHARE: std::ops::RangeInclusive<f64> = 0.0..=1.0;
 
 /// Reads the text of a calibration file; `file` is its name in what is said
 /// about it. Everything that is wrong is reported at once.
@@ -38,7 +40,7 @@ fn read_root(root: &Table<'_>) -> Option<Calibration> {
     let size = read_size(root);
     let camera = root.required_table("camera").and_then(|table| read_camera(&table, size));
     let bed = root.required_table("bed").and_then(|table| read_bed(&table));
-    let quality = root.table("quality").map(|table| table.number("reprojection_rms_px", RMS_PX));
+    let quality = root.table("quality").map(|table| read_quality(&table));
     let (bed, robot_z) = bed?;
     version?;
     Some(Calibration::Full {
@@ -47,10 +49,16 @@ fn read_root(root: &Table<'_>) -> Option<Calibration> {
         bed,
         robot_z,
         quality: match quality {
-            Some(rms) => Some(Quality { reprojection_rms_px: rms? }),
+            Some(quality) => Some(quality?),
             None => None,
         },
     })
+}
+
+fn read_quality(table: &Table<'_>) -> Option<Quality> {
+    let rms = table.number("reprojection_rms_px", RMS_PX);
+    let width_sigma_share = table.optional_number("width_sigma_share", SHARE);
+    Some(Quality { reprojection_rms_px: rms?, width_sigma_share })
 }
 
 #[expect(
@@ -139,6 +147,12 @@ pub fn to_toml(
     if let Some(quality) = quality {
         let rms = quality.reprojection_rms_px;
         let _ = write!(text, "\n[quality]\nreprojection_rms_px = {rms:?}\n");
+        if let Some(share) = quality.width_sigma_share {
+            let _ = writeln!(
+                text,
+                "width_sigma_share = {share:?} # standard deviation that it leaves in a width, of the width"
+            );
+        }
     }
     text
 }
@@ -171,7 +185,8 @@ mod tests {
             distortion: [-0.28, 0.03, 1.2e-3, -1e-5, 0.1],
         };
         let bed = Pose::new(Vector3::new(3.0, 0.1, -0.2), Vector3::new(1.5, -2.25, 400.125));
-        let quality = Some(Quality { reprojection_rms_px: 0.1234 });
+        let quality =
+            Some(Quality { reprojection_rms_px: 0.1234, width_sigma_share: Some(0.000_567) });
         let notes = ["made by hand\nfor a test".to_string()];
         let text = to_toml((&camera, &bed), [640, 480], Mm::constant(12.5), quality, &notes);
         let Calibration::Full { image_size_px, camera: c, bed: b, robot_z, quality: q } =
@@ -183,6 +198,20 @@ mod tests {
         assert_eq!((image_size_px, c, robot_z.get(), q), ([640, 480], camera, 12.5, quality));
         assert_eq!(b.translation_mm(), bed.translation_mm());
         assert!((b.rotation_rad() - bed.rotation_rad()).norm() < 1e-14);
+    }
+
+    #[test]
+    fn what_the_calibration_leaves_in_a_width_may_be_absent_but_not_more_than_all() {
+        let with = |line: &str| EXAMPLE.replace("[quality]", &format!("[quality]\n{line}"));
+        let share = |text: &str| {
+            parse("x", text).unwrap().surface(Mm::constant(20.0), None).width_sigma_share()
+        };
+        assert_eq!(share(EXAMPLE), None);
+        assert_eq!(share(&with("width_sigma_share = 0.0004")), Some(0.0004));
+        for wrong in ["1.5", "-0.1", "nan"] {
+            let said = said(&with(&format!("width_sigma_share = {wrong}")));
+            assert!(said.contains(&format!("quality.width_sigma_share: found {wrong}")), "{said}");
+        }
     }
 
     #[test]

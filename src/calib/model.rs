@@ -12,6 +12,9 @@ use crate::units::Mm;
 pub struct Quality {
     /// Root mean square of the reprojection errors \[px\].
     pub reprojection_rms_px: f64,
+    /// Relative standard deviation that the calibration leaves in a width; see
+    /// [`super::covariance::Covariance::width_sigma_share`]. Files may lack it.
+    pub width_sigma_share: Option<f64>,
 }
 
 /// What a pixel means in millimetres.
@@ -22,6 +25,8 @@ pub enum Calibration {
     Scale {
         /// Millimetres a pixel at the surface.
         mm_per_px: f64,
+        /// Its standard deviation \[mm/px\], if somebody has told it.
+        sigma: Option<f64>,
     },
     /// Camera model and bed plane; holds at any height.
     Full {
@@ -47,13 +52,21 @@ impl Calibration {
     /// the nozzle; `None` for a camera that stands still or a robot that has
     /// stayed where it was calibrated.
     pub fn surface(&self, surface_height: Mm, robot_z: Option<Mm>) -> SurfaceMap {
-        match self {
-            Self::Scale { mm_per_px } => SurfaceMap(Kind::Scale(*mm_per_px)),
+        let kind = match self {
+            Self::Scale { mm_per_px, .. } => Kind::Scale(*mm_per_px),
             Self::Full { camera, bed, robot_z: z_at_plane, .. } => {
                 let rise = robot_z.map_or(Mm::ZERO, |z| z - *z_at_plane);
                 let height_mm = (surface_height - rise).get();
-                SurfaceMap(Kind::Plane { camera: *camera, bed: *bed, height_mm })
+                Kind::Plane { camera: *camera, bed: *bed, height_mm }
             }
+        };
+        SurfaceMap { kind, width_sigma_share: self.width_sigma_share() }
+    }
+
+    fn width_sigma_share(&self) -> Option<f64> {
+        match self {
+            Self::Scale { mm_per_px, sigma } => sigma.map(|sigma| sigma / mm_per_px),
+            Self::Full { quality, .. } => quality.and_then(|quality| quality.width_sigma_share),
         }
     }
 
@@ -68,7 +81,10 @@ impl Calibration {
 
 /// From pixels to millimetres on one surface, and back.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SurfaceMap(Kind);
+pub struct SurfaceMap {
+    kind: Kind,
+    width_sigma_share: Option<f64>,
+}
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Kind {
@@ -79,14 +95,20 @@ enum Kind {
 impl SurfaceMap {
     /// A surface on which every pixel has the same size.
     pub fn from_scale(mm_per_px: f64) -> Self {
-        Self(Kind::Scale(mm_per_px))
+        Self { kind: Kind::Scale(mm_per_px), width_sigma_share: None }
+    }
+
+    /// Relative standard deviation that the calibration behind the map leaves
+    /// in a width, the same error in every width; `None` where it is not known.
+    pub fn width_sigma_share(&self) -> Option<f64> {
+        self.width_sigma_share
     }
 
     /// Where the ray of a pixel meets the surface, in the bed's axes \[mm\].
     /// The point is undistorted, never the image. `None` where the ray does
     /// not come down on the surface.
     pub fn to_mm(&self, px: ImagePoint) -> Option<SurfacePoint> {
-        match &self.0 {
+        match &self.kind {
             Kind::Scale(mm_per_px) => Some(px * *mm_per_px),
             Kind::Plane { camera, bed, height_mm } => {
                 let ray = camera.ray(px)?;
@@ -105,7 +127,7 @@ impl SurfaceMap {
     /// Where a point of the surface, in the bed's axes \[mm\], is seen \[px\].
     /// `None` behind the camera.
     pub fn to_px(&self, mm: SurfacePoint) -> Option<ImagePoint> {
-        match &self.0 {
+        match &self.kind {
             Kind::Scale(mm_per_px) => Some(mm / *mm_per_px),
             Kind::Plane { camera, bed, height_mm } => {
                 camera.project(bed.apply(Point3::new(mm.x, mm.y, *height_mm)))
@@ -116,7 +138,7 @@ impl SurfaceMap {
     /// Derivative of [`Self::to_mm`] at a pixel \[mm/px\], by central
     /// differences over a pixel.
     pub fn mm_per_px(&self, px: ImagePoint) -> Option<Matrix2<f64>> {
-        if let Kind::Scale(mm_per_px) = self.0 {
+        if let Kind::Scale(mm_per_px) = self.kind {
             return Some(Matrix2::from_diagonal_element(mm_per_px));
         }
         let half = 0.5;

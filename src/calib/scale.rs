@@ -3,7 +3,7 @@
 
 use nalgebra::Point2;
 
-use super::Calibration;
+use super::{Calibration, SurfaceMap};
 use crate::geometry::ImagePoint;
 use crate::units::Mm;
 
@@ -26,17 +26,24 @@ const GRID: u32 = 9;
 /// surface of this height. `None` where the middle of the picture does not see
 /// the surface, and for a calibration that knows no picture size.
 pub fn single_scale(calibration: &Calibration, surface_height: Mm) -> Option<SingleScale> {
-    let [width, height] = calibration.image_size_px()?.map(|px| f64::from(px) - 1.0);
+    let image_size_px = calibration.image_size_px()?;
+    let [width, height] = image_size_px.map(|px| f64::from(px) - 1.0);
     let map = calibration.surface(surface_height, None);
     let sizes = |px: ImagePoint| Some(map.mm_per_px(px)?.singular_values());
-    let middle = map.mm_per_px(Point2::new(width / 2.0, height / 2.0))?;
-    let mm_per_px = middle.determinant().abs().sqrt();
+    let mm_per_px = in_the_middle(&map, image_size_px)?;
     let steps = f64::from(GRID - 1);
     let (smallest, largest) = (0..GRID * GRID)
         .map(|i| (f64::from(i % GRID) / steps, f64::from(i / GRID) / steps))
         .filter_map(|(x, y)| sizes(Point2::new(x * width, y * height)))
         .fold((mm_per_px, mm_per_px), |(low, high), s| (low.min(s.min()), high.max(s.max())));
     Some(SingleScale { mm_per_px, smallest, largest })
+}
+
+/// Millimetres a pixel in the middle of a picture of this size, mean of all
+/// directions; `None` where the middle does not see the surface.
+pub(super) fn in_the_middle(map: &SurfaceMap, image_size_px: [u32; 2]) -> Option<f64> {
+    let [x, y] = image_size_px.map(|px| (f64::from(px) - 1.0) / 2.0);
+    Some(map.mm_per_px(Point2::new(x, y))?.determinant().abs().sqrt())
 }
 
 #[cfg(test)]

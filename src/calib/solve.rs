@@ -207,35 +207,10 @@ mod tests {
     use super::*;
     use crate::calib::Calibration;
     use crate::calib::plane::bed_from_board;
+    use crate::calib::synthetic::{self, SIZE, TRUTH, board, poses};
     use crate::units::Mm;
-    use nalgebra::{Point2, Vector3};
     use rand::{RngExt, SeedableRng};
     use rand_xoshiro::Xoshiro256PlusPlus;
-
-    const TRUTH: Camera = Camera {
-        focal_px: [1210.0, 1215.0],
-        centre_px: [352.0, 263.0],
-        distortion: [-0.22, 0.11, 8e-4, -5e-4, 0.0],
-    };
-    const SIZE: [u32; 2] = [720, 540];
-
-    fn board() -> Board {
-        Board::new(9, 6, Mm::constant(20.0)).unwrap()
-    }
-
-    /// A dozen poses of the board around the picture, tilted to all sides.
-    fn poses() -> Vec<Pose> {
-        (0..12_u32)
-            .map(|i| {
-                let turn = f64::from(i) * 0.55;
-                let tilt = 0.15 + 0.04 * f64::from(i);
-                let rotation = Vector3::new(tilt * turn.cos(), tilt * turn.sin(), 0.1 * turn);
-                let place =
-                    Vector3::new(-80.0 + 25.0 * turn.cos(), -50.0 + 18.0 * turn.sin(), 420.0);
-                Pose::new(rotation, place)
-            })
-            .collect()
-    }
 
     /// What the true camera sees, off by up to `noise_px` in each direction.
     fn sightings(noise_px: f64) -> Vec<Sighting> {
@@ -246,10 +221,8 @@ mod tests {
             .iter()
             .enumerate()
             .map(|(i, pose)| {
-                let seen = |p: &Point3<f64>| TRUTH.project(pose.apply(*p)).unwrap();
-                let corners = board().corners_mm();
-                let moved = corners.iter().map(seen).map(|p| Point2::new(p.x + off(), p.y + off()));
-                Sighting { name: i.to_string(), image_size_px: SIZE, corners_px: moved.collect() }
+                let corners_px = synthetic::corners(pose, &mut off);
+                Sighting { name: i.to_string(), image_size_px: SIZE, corners_px }
             })
             .collect()
     }

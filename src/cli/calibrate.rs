@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use super::WrongArguments;
 use crate::bridge::{self, BoardView};
 use crate::calib::board::Board;
+use crate::calib::covariance::Covariance;
 use crate::calib::plane::bed_from_board;
 use crate::calib::solve::{self, Refusal, Sighting, Solution};
 use crate::calib::{Calibration, Quality, file};
@@ -74,6 +75,8 @@ fn parse_length(text: &str) -> Result<Mm, String> {
 struct Plane {
     image: String,
     assumed: bool,
+    /// The board's axes in the camera's.
+    board: Pose,
     bed: Pose,
     thickness: Mm,
     robot_z: Mm,
@@ -99,10 +102,16 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     let solution = solve::solve(&board, &seen).inspect_err(|_| say(&report::refusals(&looks)))?;
     say(&report::images(&looks, &solution));
     let plane = find_plane(args, &board, &solution, &looks)?;
-    let calibration = write(args, &board, &solution, &plane)?;
+    let covariance = Covariance::of(&board, &solution, &plane.board, plane.thickness);
+    let quality = Quality {
+        reprojection_rms_px: solution.rms_px,
+        width_sigma_share: covariance.as_ref().and_then(Covariance::width_sigma_share),
+    };
+    let calibration = write(args, &board, (&solution, quality), &plane)?;
     say(&report::camera(&solution));
     say(&report::plane(&plane));
-    say(&report::scale(&calibration, plane.thickness));
+    say(&report::width(&calibration, covariance.as_ref()));
+    say(&report::scale(&calibration, covariance.as_ref(), plane.thickness));
     say(&report::doubts(&solution));
     say(&format!("\nwrote {}\n", args.out.display()));
     Ok(())
@@ -187,6 +196,7 @@ fn find_plane(
     Ok(Plane {
         image,
         assumed: args.plane.is_none(),
+        board: pose,
         bed: bed_from_board(&pose, args.board_thickness_mm),
         thickness: args.board_thickness_mm,
         robot_z: args.robot_z_mm,
@@ -227,7 +237,7 @@ fn plane_pose(
 fn write(
     args: &CalibrateArgs,
     board: &Board,
-    solution: &Solution,
+    (solution, quality): (&Solution, Quality),
     plane: &Plane,
 ) -> anyhow::Result<Calibration> {
     let (columns, rows) = board.corners();
@@ -239,9 +249,9 @@ fn write(
         plane.thickness,
         plane.image,
     );
-    let quality = Some(Quality { reprojection_rms_px: solution.rms_px });
     let model = (&solution.camera, &plane.bed);
-    let text = file::to_toml(model, solution.image_size_px, plane.robot_z, quality, &[note]);
+    let (size, robot_z) = (solution.image_size_px, plane.robot_z);
+    let text = file::to_toml(model, size, robot_z, Some(quality), &[note]);
     let name = args.out.display().to_string();
     let calibration = file::parse(&name, &text)
         .context("the solution is not a camera that can measure; nothing was written")?;

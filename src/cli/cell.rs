@@ -42,8 +42,8 @@ impl LoadedCell {
     pub fn from_text(path: &Path, text: String, purpose: Purpose) -> anyhow::Result<Self> {
         let cell = Cell::parse(path, &text, purpose)?;
         let (calibration, calibration_text) = match &cell.calibration {
-            CalibrationSource::Scale(mm_per_px) => {
-                (Calibration::Scale { mm_per_px: *mm_per_px }, None)
+            CalibrationSource::Scale { mm_per_px, sigma } => {
+                (Calibration::Scale { mm_per_px: *mm_per_px, sigma: *sigma }, None)
             }
             CalibrationSource::File(file) => {
                 let calibration = calibration_file::read(file)?;
@@ -65,7 +65,12 @@ impl LoadedCell {
     /// Calibration and height in words, for the head of a report.
     pub fn calibration_words(&self) -> String {
         match &self.cell.calibration {
-            CalibrationSource::Scale(mm_per_px) => format!("{mm_per_px} mm/px at the surface"),
+            CalibrationSource::Scale { mm_per_px, sigma: Some(sigma) } => {
+                format!("{mm_per_px} ± {sigma} mm/px at the surface")
+            }
+            CalibrationSource::Scale { mm_per_px, sigma: None } => {
+                format!("{mm_per_px} mm/px at the surface")
+            }
             CalibrationSource::File(file) => {
                 format!("{}, surface {} above the bed", file.display(), self.cell.surface_height)
             }

@@ -17,6 +17,8 @@ use crate::vision::{Axis, Gauge, Method, Polarity};
 
 /// Largest image side that is taken \[px\].
 const MAX_SIDE_PX: f64 = 65_536.0;
+/// Sizes of a pixel at the surface that are taken \[mm/px\].
+const SCALE_MM_PER_PX: std::ops::RangeInclusive<f64> = 1e-6..=1e3;
 
 /// What a cell file is read for; keys that a purpose does not need may be
 /// absent.
@@ -73,8 +75,13 @@ pub struct RunPart {
 pub enum CalibrationSource {
     /// A calibration file.
     File(PathBuf),
-    /// The single number of the 2022 paper \[mm/px\].
-    Scale(f64),
+    /// The single number of the 2022 paper.
+    Scale {
+        /// Millimetres a pixel at the surface.
+        mm_per_px: f64,
+        /// Its standard deviation \[mm/px\], if the file says so.
+        sigma: Option<f64>,
+    },
 }
 
 /// Where frames come from.
@@ -206,7 +213,8 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
 
 fn read_calibration(table: &Table<'_>, folder: &Path) -> Option<CalibrationSource> {
     let file = table.optional_text("file");
-    let scale = table.optional_number("mm_per_px", 1e-6..=1e3);
+    let scale = table.optional_number("mm_per_px", SCALE_MM_PER_PX);
+    let sigma = read_scale_sigma(table, scale);
     match (table.has("file"), table.has("mm_per_px")) {
         (true, true) => {
             table.report("mm_per_px", "a scale beside a file", "one of file and mm_per_px");
@@ -217,8 +225,21 @@ fn read_calibration(table: &Table<'_>, folder: &Path) -> Option<CalibrationSourc
             None
         }
         (true, false) => file.map(|name| CalibrationSource::File(folder.join(name))),
-        (false, true) => scale.map(CalibrationSource::Scale),
+        (false, true) => Some(CalibrationSource::Scale { mm_per_px: scale?, sigma }),
     }
+}
+
+/// Standard deviation of the single number \[mm/px\], if the file has one.
+fn read_scale_sigma(table: &Table<'_>, scale: Option<f64>) -> Option<f64> {
+    const KEY: &str = "mm_per_px_sigma";
+    let sigma = table.optional_number(KEY, 0.0..=*SCALE_MM_PER_PX.end())?;
+    if !table.has("mm_per_px") {
+        table.report(KEY, "the standard deviation of no scale", "mm_per_px beside it");
+    }
+    if scale.is_some_and(|scale| sigma >= scale) {
+        table.report(KEY, sigma.to_string(), "less than mm_per_px");
+    }
+    Some(sigma)
 }
 
 fn read_gauge(table: &Table<'_>) -> Option<Gauge> {

@@ -101,7 +101,7 @@ fn one(cell: &Cell, run: &RunPart, target_mm: f64, seed: u64) -> Result<(Score, 
     cell.simulation.seed = seed + 1;
     let mut run = run.clone();
     run.control.target = Mm::new(target_mm).unwrap_or(run.control.target);
-    let scale = Calibration::Scale { mm_per_px: MM_PER_PX };
+    let scale = Calibration::Scale { mm_per_px: MM_PER_PX, sigma: None };
     let mut sim = SimCell::new(&cell, &run, scale, NoRecorder)?;
     let mut score = Score::new(target_mm);
     let _ = sim.layer(Mm::ZERO, &mut score);

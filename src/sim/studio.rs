@@ -36,8 +36,11 @@ pub struct Studio {
 impl Studio {
     /// For the pictures of a set.
     pub fn new(set: &Set) -> Result<Self, RenderError> {
-        let calibration =
-            if set.tilted { tilted() } else { Calibration::Scale { mm_per_px: MM_PER_PX } };
+        let calibration = if set.tilted {
+            tilted()
+        } else {
+            Calibration::Scale { mm_per_px: MM_PER_PX, sigma: None }
+        };
         let height = if set.tilted { Mm::constant(20.0) } else { Mm::ZERO };
         let gauge = set.gauge();
         let surface = calibration.surface(height, None);

@@ -169,6 +169,15 @@ impl Measurer {
         frame: &Frame,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
+        self.measure_picture(frame, surface)?.with_calibration(surface)
+    }
+
+    /// The same with no more in sigma than the picture itself leaves open.
+    fn measure_picture(
+        &mut self,
+        frame: &Frame,
+        surface: &SurfaceMap,
+    ) -> Result<WidthMeasurement, Reject> {
         let work = &mut self.work;
         work.left_px.clear();
         work.right_px.clear();

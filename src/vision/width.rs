@@ -1,5 +1,7 @@
 //! The result of a measurement.
 
+use super::reject::Reject;
+use crate::calib::SurfaceMap;
 use crate::geometry::ImagePoint;
 use crate::units::Mm;
 
@@ -10,7 +12,8 @@ pub struct WidthMeasurement {
     /// bead's axis, averaged over the gauge.
     pub width: Mm,
     /// Standard deviation of `width` against the true mean width within the
-    /// gauge, as the measurement believes it.
+    /// gauge, as the measurement believes it: the picture's share and, where it
+    /// is known, the calibration's.
     pub sigma: Mm,
     /// Standard deviation of the width along the gauge about its mean: the
     /// bead's own waviness, which is signal.
@@ -24,6 +27,16 @@ pub struct WidthMeasurement {
     pub slant_rad: f64,
     /// What the person who sets up light and lens wants to know.
     pub hints: Hints,
+}
+
+impl WidthMeasurement {
+    /// Adds what the calibration leaves open to the picture's own sigma.
+    pub(super) fn with_calibration(self, surface: &SurfaceMap) -> Result<Self, Reject> {
+        let Some(share) = surface.width_sigma_share() else { return Ok(self) };
+        let variance = self.sigma.get().powi(2) + (share * self.width.get()).powi(2);
+        let sigma = Mm::new(variance.sqrt()).map_err(|_| Reject::OffSurface)?;
+        Ok(Self { sigma, ..self })
+    }
 }
 
 /// How good the picture is.

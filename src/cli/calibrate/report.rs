@@ -6,9 +6,11 @@ use nalgebra::{Point3, Vector3};
 
 use super::{Looks, Plane};
 use crate::calib::Calibration;
+use crate::calib::covariance::Covariance;
 use crate::calib::quality;
 use crate::calib::scale::single_scale;
 use crate::calib::solve::Solution;
+use crate::geometry::ImagePoint;
 use crate::units::Mm;
 
 /// Adds a line to a text, which cannot fail.
@@ -108,8 +110,50 @@ pub fn plane(plane: &Plane) -> String {
     out
 }
 
+/// How far a width can be trusted, with a bead in the middle of the picture as
+/// an example.
+pub fn width(calibration: &Calibration, covariance: Option<&Covariance>) -> String {
+    let mut out = String::new();
+    let shares = covariance.map(|c| (c, c.width_sigma_share(), c.width_sigma_share_anywhere()));
+    let Some((covariance, Some(share), anywhere)) = shares else {
+        line!(out, "\nhow well a width on the bed is known cannot be told: the pictures do not");
+        line!(out, "  tell the camera's numbers apart");
+        return out;
+    };
+    let example = example(calibration, share);
+    line!(out, "\na width on the bed is known to {:.3} %{example}", 100.0 * share);
+    line!(out, "  as far as the corners' noise tells; sigma_mm of each width contains it");
+    let [from, to] = covariance.seen_px();
+    line!(
+        out,
+        "  holds where boards were seen, columns {:.0} to {:.0} and rows {:.0} to {:.0};",
+        from.x,
+        to.x,
+        from.y,
+        to.y
+    );
+    if let Some(anywhere) = anywhere {
+        line!(out, "  in all of the picture it is {:.3} % or better", 100.0 * anywhere);
+    }
+    out
+}
+
+/// The share of a bead that is a third of the picture's width wide, in mm.
+fn example(calibration: &Calibration, share: f64) -> String {
+    let ends = calibration.image_size_px().and_then(|size| {
+        let [width, height] = size.map(f64::from);
+        let end = |part: f64| ImagePoint::new(part * width, height / 2.0);
+        let map = calibration.surface(Mm::ZERO, None);
+        Some((map.to_mm(end(1.0 / 3.0))?, map.to_mm(end(2.0 / 3.0))?))
+    });
+    ends.map_or_else(String::new, |(left, right)| {
+        let width_mm = (right - left).norm();
+        format!(" ({:.3} mm in {width_mm:.0} mm)", share * width_mm)
+    })
+}
+
 /// The single number of the 2022 paper, and what it is worth.
-pub fn scale(calibration: &Calibration, face: Mm) -> String {
+pub fn scale(calibration: &Calibration, covariance: Option<&Covariance>, face: Mm) -> String {
     let mut out = String::new();
     let Some(scale) = single_scale(calibration, face) else {
         line!(
@@ -119,7 +163,10 @@ pub fn scale(calibration: &Calibration, face: Mm) -> String {
         return out;
     };
     let percent = |size: f64| 100.0 * (scale.mm_per_px / size - 1.0);
-    line!(out, "\nsingle number: {:.6} mm/px", scale.mm_per_px);
+    let sigma =
+        covariance.and_then(|covariance| covariance.mm_per_px(face)).map(|(_, sigma)| sigma);
+    let spread = sigma.map_or_else(String::new, |sigma| format!(" ± {sigma:.6}"));
+    line!(out, "\nsingle number: {:.6}{spread} mm/px", scale.mm_per_px);
     line!(out, "  holds in the middle of the picture for a surface {face} above the bed;");
     line!(
         out,
@@ -135,6 +182,9 @@ pub fn scale(calibration: &Calibration, face: Mm) -> String {
         scale.mm_per_px
     );
     line!(out, "  file = … in the [calibration] of a cell file");
+    if let Some(sigma) = sigma {
+        line!(out, "  and, for a bead in the middle, mm_per_px_sigma = {sigma:.6} beside it");
+    }
     out
 }
 

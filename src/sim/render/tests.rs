@@ -26,7 +26,7 @@ fn upright() -> Gauge {
 }
 
 fn scale() -> Calibration {
-    Calibration::Scale { mm_per_px: PAPER_SCALE }
+    Calibration::Scale { mm_per_px: PAPER_SCALE, sigma: None }
 }
 
 fn tilted() -> Calibration {

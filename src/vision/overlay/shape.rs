@@ -2,7 +2,7 @@
 //! surroundings on either side are plain, and how they are shaded.
 
 use super::flank::{Flank, Flanks};
-use super::{Overlay, PHASES, REACH, ROUNDING, SPAN, place};
+use super::{Overlay, REACH, ROUNDING, SPAN};
 use crate::vision::line::Line;
 use crate::vision::normal::Normal;
 use crate::vision::step::StepTable;

@@ -56,7 +56,7 @@ fn camera() -> (RenderedCamera, RobotView, Sender<()>) {
         offset: Mm::constant(90.0),
         deadline: Span::from_millis(2000),
     };
-    let scale = Calibration::Scale { mm_per_px: 0.1 };
+    let scale = Calibration::Scale { mm_per_px: 0.1, sigma: None };
     let picture = SMOOTH_STEADY.picture;
     let renderer = Renderer::new(scale, Mm::ZERO, gauge, picture, 1).unwrap();
     let (stop, stopped) = bounded(1);
