@@ -8,6 +8,7 @@ use std::ops::Range;
 use super::phase::split;
 use super::sheet::Sheet;
 
+mod curved;
 mod flank;
 mod shape;
 

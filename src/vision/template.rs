@@ -172,8 +172,8 @@ impl Template {
                 } else {
                     fill_plain(part, shape, first);
                 }
-                if shape.flanks.any() {
-                    add_flanks(part, table, shape, first);
+                if shape.is_bent() {
+                    add_bends(part, table, shape, first);
                 }
             }
         }
@@ -297,7 +297,7 @@ fn fill_core(part: &mut Part, table: &StepTable, shape: &Shape, first: f64) {
         let (step, density) = table.at(z);
         let depth_before = blur * (density - z * (1.0 - step));
         let depth_after = blur * (density + z * step);
-        let shading = shape.shading.0 * depth_before + shape.shading.1 * depth_after;
+        let shading = shape.shading[0].slope * depth_before + shape.shading[1].slope * depth_after;
         let counts = distance >= -shape.extent.before && distance <= shape.extent.after;
         let mask = f64::from(counts);
         part.step[k] = (step + shading) as f32;
@@ -313,9 +313,9 @@ fn fill_core(part: &mut Part, table: &StepTable, shape: &Shape, first: f64) {
 fn fill_plain(part: &mut Part, shape: &Shape, first: f64) {
     let (first, after) = (first as f32, first > 0.0);
     let (step, extent, shading) = if after {
-        (1.0, shape.extent.after as f32, shape.shading.1 as f32)
+        (1.0, shape.extent.after as f32, shape.shading[1].slope as f32)
     } else {
-        (0.0, shape.extent.before as f32, shape.shading.0 as f32)
+        (0.0, shape.extent.before as f32, shape.shading[0].slope as f32)
     };
     for (k, ahead) in (0u8..).zip(&mut part.step) {
         *ahead = first + f32::from(k);
@@ -327,12 +327,22 @@ fn fill_plain(part: &mut Part, shape: &Shape, first: f64) {
     }
 }
 
-/// Adds the tails of the steps beside the edge.
+/// Adds bent shading and the tails of steps beside the edge.
 #[cold]
 #[expect(clippy::cast_possible_truncation, reason = "shares of a step")]
-fn add_flanks(part: &mut Part, table: &StepTable, shape: &Shape, first: f64) {
-    for (k, step) in part.step.iter_mut().enumerate() {
-        *step += shape.flanks.at(table, first + float(k)) as f32;
+fn add_bends(part: &mut Part, table: &StepTable, shape: &Shape, first: f64) {
+    let blur = shape.step.blur;
+    let [bend_before, bend_after] = shape.shading.map(|shading| shading.bend * blur * blur);
+    for (k, level) in part.step.iter_mut().enumerate() {
+        let away = first + float(k);
+        let z = away / blur;
+        let (step, density) = table.at(z);
+        // Squares of the distances on one side, blurred.
+        let square = 1.0 + z * z;
+        let before = square * (1.0 - step) - z * density;
+        let after = square * step + z * density;
+        let bends = bend_before * before + bend_after * after;
+        *level += (bends + shape.flanks.at(table, away)) as f32;
     }
 }
 

@@ -449,7 +449,7 @@ impl Tracer {
         self.course.adopt(narrow(at), (narrow(before), narrow(after)));
         Shape {
             step: Step { at: 0.0, before: 0.0, after: 1.0, ..shape.step },
-            shading: (shape.shading.0 / height, shape.shading.1 / height),
+            shading: shape.shading.map(|shading| shading.of(height)),
             flanks,
             variance: shape.variance / (height * height),
             ..shape

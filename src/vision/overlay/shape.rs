@@ -1,7 +1,8 @@
 //! The shape of an edge, from its overlay: place, blur and levels, how far its
 //! surroundings on either side are plain, and how they are shaded.
 
-use super::flank::{Flank, Flanks};
+use super::flank::Flank;
+pub(super) use super::flank::Flanks;
 use super::{Overlay, REACH, ROUNDING, SPAN};
 use crate::vision::line::Line;
 use crate::vision::normal::Normal;
@@ -101,6 +102,33 @@ impl Look {
     }
 }
 
+/// How the level beside an edge changes away from it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Shading {
+    /// Change at the edge \[1/px\].
+    pub slope: f64,
+    /// Half the change of that \[1/px²\].
+    pub bend: f64,
+}
+
+impl Shading {
+    /// The same in shares of a step of which the given one is a share.
+    pub fn of(self, share: f64) -> Self {
+        Self { slope: self.slope / share, bend: self.bend / share }
+    }
+}
+
+/// One side of an edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Beside {
+    /// How far there is nothing else \[px\].
+    pub extent: f64,
+    /// How its level changes, in shares of the step that was given.
+    pub shading: Shading,
+    /// Variance that the doubt about it leaves to the level at the edge.
+    pub doubt: f64,
+}
+
 /// An edge as the overlay shows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shape {
@@ -108,14 +136,21 @@ pub struct Shape {
     pub step: Step,
     /// How far the surroundings are plain, and what is used of them.
     pub extent: Extent,
-    /// Change of the level for each pixel away from the edge, before and after
-    /// it, in shares of the step \[1/px\].
-    pub shading: (f64, f64),
+    /// How the level changes away from the edge, before it and after it, in
+    /// shares of the step.
+    pub shading: [Shading; 2],
     /// Steps beside the edge that reach into its pixels, in shares of its own.
     pub flanks: Flanks,
     /// Variance of the edge's position that doubt about the shading and about
     /// flanks leaves \[px²\].
     pub variance: f64,
+}
+
+impl Shape {
+    /// Whether there is more beside the edge than even slopes.
+    pub fn is_bent(&self) -> bool {
+        self.flanks.any() || self.shading.iter().any(|shading| shading.bend != 0.0)
+    }
 }
 
 impl Overlay {
@@ -171,18 +206,17 @@ impl Overlay {
         let Look { step, noise, room, flanks, doubt, .. } = look;
         let sharp = step.blur * step.blur - ROUNDING;
         let step = Step { blur: sharp.max(LEAST_BLUR_PX.powi(2)).sqrt(), ..step };
-        let (before, line_before) = self.plain(table, (&step, &flanks), noise, -1.0, room.before);
-        let (after, line_after) = self.plain(table, (&step, &flanks), noise, 1.0, room.after);
-        let ((slope_before, doubt_before), (slope_after, doubt_after)) =
-            (line_before.sure_slope(look.pixel_noise), line_after.sure_slope(look.pixel_noise));
+        let noise = (noise, look.pixel_noise);
+        let before = self.one_side(table, (&step, &flanks), noise, (-1.0, room.before));
+        let after = self.one_side(table, (&step, &flanks), noise, (1.0, room.after));
         // A level that is off by a share moves the edge by √π blurs times it.
         let per_level = std::f64::consts::PI * step.blur * step.blur;
         Some(Shape {
             step,
-            extent: Extent { before, after },
-            shading: (slope_before, slope_after),
+            extent: Extent { before: before.extent, after: after.extent },
+            shading: [before.shading, after.shading],
             flanks,
-            variance: per_level * (doubt_before + doubt_after) + doubt,
+            variance: per_level * (before.doubt + after.doubt) + doubt,
         })
     }
 
@@ -353,6 +387,46 @@ impl Overlay {
         (normal, square / f64::max(n, 1.0))
     }
 
+    /// One side of the edge: along a straight line, or along a parabola where
+    /// that ends early. `noise` is that of a row's samples and that of a pixel.
+    #[inline(always)]
+    fn one_side(
+        &self,
+        table: &StepTable,
+        step: (&Step, &Flanks),
+        (noise, pixel_noise): (f64, f64),
+        (sign, room): (f64, f64),
+    ) -> Beside {
+        let (extent, line) = self.plain(table, step, noise, sign, room);
+        if extent + 2.0 <= room
+            && let Some(curved) = self.curved(table, step, noise, (sign, room))
+        {
+            return curved;
+        }
+        let (slope, doubt) = line.sure_slope(pixel_noise);
+        Beside { extent, shading: Shading { slope, bend: 0.0 }, doubt }
+    }
+
+    /// Samples of two pixels beside the edge, from a distance on: how far each
+    /// lies away from it, what it is beyond the level there, and its weight.
+    #[inline(always)]
+    pub(super) fn beside_step(
+        &self,
+        table: &StepTable,
+        (step, flanks): (&Step, &Flanks),
+        (sign, from): (f64, f64),
+        mut add: impl FnMut(f64, f64, f64),
+    ) {
+        let height = step.after - step.before;
+        let (near, far) = (step.at + sign * from, step.at + sign * (from + 2.0));
+        for (at, value, weight) in self.samples(near.min(far), near.max(far) - 1e-9) {
+            let (share, _) = table.at((at - step.at) / step.blur);
+            let beside = if flanks.any() { flanks.at(table, at) } else { 0.0 };
+            let off = value - beside - step.before - height * share;
+            add(sign * (at - step.at), off, weight);
+        }
+    }
+
     /// How far from the edge a side is plain, that is a straight line within
     /// what noise explains, and that line.
     #[inline(always)]
@@ -370,13 +444,9 @@ impl Overlay {
         let mut end = first.min(room);
         while end + 2.0 <= room {
             let mut block = Line::default();
-            let (near, far) = (shape.at + sign * end, shape.at + sign * (end + 2.0));
-            for (distance, value, weight) in self.samples(near.min(far), near.max(far) - 1e-9) {
-                let (step, _) = table.at((distance - shape.at) / shape.blur);
-                let beside = if flanks.any() { flanks.at(table, distance) } else { 0.0 };
-                let miss = value - beside - shape.before - height * step;
-                block.add(sign * (distance - shape.at), miss, weight);
-            }
+            self.beside_step(table, (shape, flanks), (sign, end), |away, off, weight| {
+                block.add(away, off, weight);
+            });
             if block.weight <= 0.0 {
                 break;
             }
