@@ -1,0 +1,87 @@
+//! Surroundings of an edge whose level changes along no straight line: shading
+//! that falls off away from the edge, as under a lamp close by or in the hollow
+//! beside a bead.
+
+use super::Overlay;
+use super::shape::{Beside, Flanks, Shading, Step};
+use crate::vision::normal::Normal;
+use crate::vision::step::StepTable;
+
+/// Farthest that a parabola follows the surroundings \[px\].
+const FARTHEST_PX: f64 = 32.0;
+/// Pixels that tell a parabola, before others are held against it.
+const LEAST_PX: f64 = 8.0;
+/// Pixels that it must hold for.
+const ENOUGH_PX: f64 = 12.0;
+/// A bend is believed from so many standard deviations on.
+const SURE: f64 = 4.0;
+/// Unit of distances, so that the equations are well scaled \[px\].
+const UNIT_PX: f64 = 10.0;
+
+impl Overlay {
+    /// How far from the edge a side follows a parabola, and that; `None` where no
+    /// bend shows.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn curved(
+        &self,
+        table: &StepTable,
+        (step, flanks): (&Step, &Flanks),
+        noise: f64,
+        (sign, room): (f64, f64),
+    ) -> Option<Beside> {
+        let height = step.after - step.before;
+        let first = 3.0 * step.blur;
+        let mut normal = Normal::<3>::default();
+        let (mut end, mut rows) = (first, 0.0);
+        while end + 2.0 <= room.min(FARTHEST_PX) {
+            let (mut place, mut miss, mut weight) = (0.0, 0.0, 0.0);
+            self.beside_step(table, (step, flanks), (sign, end), |away, off, rows| {
+                place += rows * away;
+                miss += rows * off;
+                weight += rows;
+            });
+            if weight <= 0.0 {
+                break;
+            }
+            let (place, miss) = (place / weight, miss / weight);
+            if end >= first + LEAST_PX {
+                let solved = normal.solve()?;
+                let row = terms(place);
+                let expected: f64 =
+                    row.iter().zip(solved.unknowns.iter()).map(|(a, b)| a * b).sum();
+                let row = nalgebra::SVector::from(row);
+                let variance = (row.transpose() * solved.covariance() * row)[0];
+                let doubt = noise * noise * (variance + 1.0 / weight);
+                if (miss - expected).abs() > 4.0 * doubt.sqrt() + 0.006 * height {
+                    break;
+                }
+            }
+            self.beside_step(table, (step, flanks), (sign, end), |away, off, rows| {
+                normal.add(terms(away), off, rows);
+            });
+            rows += weight;
+            end += 2.0;
+        }
+        if end < first + ENOUGH_PX {
+            return None;
+        }
+        let solved = normal.solve()?;
+        let covariance = solved.covariance() * noise * noise;
+        let bend = solved.unknowns[2];
+        let sure = bend * bend > SURE * SURE * covariance[(2, 2)];
+        sure.then(|| Beside {
+            extent: end,
+            shading: Shading {
+                slope: solved.unknowns[1] / UNIT_PX,
+                bend: bend / (UNIT_PX * UNIT_PX),
+            },
+            doubt: (covariance[(0, 0)] - noise * noise / rows).max(0.0),
+        })
+    }
+}
+
+fn terms(away: f64) -> [f64; 3] {
+    let away = away / UNIT_PX;
+    [1.0, away, away * away]
+}
