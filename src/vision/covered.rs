@@ -24,7 +24,7 @@ pub struct Bead<'a, T> {
 
 impl<T: Grey> Bead<'_, T> {
     /// Locates the hidden one of two edges, or both, along steps that run beside
-    /// each other. Returns whether all could be located, covered or not.
+    /// each other, where there are any.
     #[cold]
     pub fn uncover(
         &self,
@@ -32,7 +32,7 @@ impl<T: Grey> Bead<'_, T> {
         table: &StepTable,
         blur: (f64, f64),
         parallel: &mut Parallel,
-    ) -> bool {
+    ) {
         let [left_scene, right_scene] = &self.scenes;
         let width = left_scene.width_px;
         let range = width - ABOUT_PX..width + ABOUT_PX;
@@ -40,16 +40,14 @@ impl<T: Grey> Bead<'_, T> {
         let lefts = |band| self.places(band, left, left_scene, self.bright);
         let rights = |band| self.places(band, right, right_scene, !self.bright);
         if !parallel.find(bands, (lefts, rights), range) {
-            return true;
+            return;
         }
-        let mut found = true;
         if left.is_hidden() {
-            found &= left.uncover_along(table, left_scene, (blur, parallel.lefts()));
+            left.uncover_along(table, left_scene, (blur, parallel.lefts()));
         }
         if right.is_hidden() {
-            found &= right.uncover_along(table, right_scene, (blur, parallel.rights()));
+            right.uncover_along(table, right_scene, (blur, parallel.rights()));
         }
-        found
     }
 
     /// Where an edge may be in a band: where it was located, or at any step of

@@ -48,6 +48,8 @@ const LINE_OFF_PX: f64 = 0.75;
 /// Largest standard deviation of a width whose edges are covered in part
 /// \[px\]: beyond it, what is left of an edge does not tell its course.
 const COVERED_SIGMA_PX: f64 = 0.19;
+/// Share of clear rows from which on an edge's course is sure enough.
+const PLENTY_CLEAR: f64 = 0.6;
 /// Ground on either side of the bead that its noise is taken from \[px\].
 const BESIDE_PX: f32 = 12.0;
 /// Share by which the blur of one edge differs from the other's.
@@ -55,6 +57,8 @@ const DIFFERENT: f64 = 0.04;
 /// Largest scatter of neighbouring edges about each other \[px\] that still is
 /// an edge, not noise.
 const MAX_SCATTER_PX: f64 = 1.5;
+/// The same where one edge was hidden and had to be located line by line.
+const LOST_SCATTER_PX: f64 = 0.5;
 
 /// Steps that noise alone makes are passed over up to so many of its standard
 /// deviations.
@@ -284,7 +288,7 @@ impl Work {
             *seen = tracer.look(&self.table, scene, rough.iter().copied());
         }
         let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
-        if let [Some(left), Some(right)] = seen {
+        if let [Some(_), Some(_)] = seen {
             let cut_off = [self.left.is_cut_off(&scene), self.right.is_cut_off(&right_scene)];
             if cut_off != [[false; 2]; 2] {
                 self.least_off_px = OFF_PX;
@@ -293,18 +297,19 @@ impl Work {
                 self.noise = bead.trace(tracers, &self.table, cut_off)?;
                 return Ok(());
             }
-            let blur = common_blur(left, right);
-            let mut found = true;
+        }
+        if let Some(blur) = common_blur(seen) {
             for (tracer, scene) in [&mut self.left, &mut self.right].into_iter().zip(&scenes) {
-                found &= tracer.trace(&self.table, scene, blur);
+                tracer.trace(&self.table, scene, blur);
             }
             if self.left.is_hidden() || self.right.is_hidden() {
                 let candidates = &self.candidates;
                 let bead = covered::Bead { scenes, candidates, bright: pair.bright };
                 let tracers = [&mut self.left, &mut self.right];
-                found &= bead.uncover(tracers, &self.table, blur, &mut self.parallel);
+                bead.uncover(tracers, &self.table, blur, &mut self.parallel);
             }
             self.is_lost = self.one_is_lost();
+            let found = self.left.is_located() && self.right.is_located();
             if found && !self.is_lost && !is_strange([self.left.misfit, self.right.misfit]) {
                 self.least_off_px = OFF_PX;
                 return Ok(());
@@ -395,8 +400,9 @@ impl Work {
         let got = self.left.used_share().min(self.right.used_share());
         let enough =
             [&self.left, &self.right].iter().all(|side| side.used_share() >= need_of(side));
-        if !enough || worst > MAX_SCATTER_PX {
-            let got = if worst > MAX_SCATTER_PX { 0.0 } else { got };
+        let limit = if self.is_lost { LOST_SCATTER_PX } else { MAX_SCATTER_PX };
+        if !enough || worst > limit {
+            let got = if worst > limit { 0.0 } else { got };
             return Err(Reject::NoPair { got, need: NEED_ROWS });
         }
         Ok(())
@@ -456,8 +462,9 @@ impl Work {
     /// run.
     fn check_covered(&self, found: &WidthMeasurement) -> Result<(), Reject> {
         let share = found.sigma.get() / found.width.get();
-        let covered = self.left.covered || self.right.covered || self.is_lost;
-        if covered && share * f64::from(self.width_px) > COVERED_SIGMA_PX {
+        let sparse = |side: &Tracer| side.covered && side.used_share() < PLENTY_CLEAR;
+        let unsure = sparse(&self.left) || sparse(&self.right);
+        if unsure && share * f64::from(self.width_px) > COVERED_SIGMA_PX {
             let got = self.left.used_share().min(self.right.used_share());
             return Err(Reject::NoPair { got, need: NEED_ROWS });
         }
@@ -471,12 +478,17 @@ fn need_of(side: &Tracer) -> f64 {
 }
 
 /// Blur that both edges have, seen through one lens, and how far one may differ
-/// from it \[px\], from that of each and its standard deviation.
-fn common_blur(left: (f64, f64), right: (f64, f64)) -> (f64, f64) {
+/// from it \[px\], from that of each and its standard deviation; `None` where
+/// neither has one.
+fn common_blur(seen: [Option<(f64, f64)>; 2]) -> Option<(f64, f64)> {
     let weight = |(blur, sd): (f64, f64)| 1.0 / (sd * sd + (DIFFERENT * blur).powi(2));
-    let (a, b) = (weight(left), weight(right));
-    let blur = (a * left.0 + b * right.0) / (a + b);
-    (blur, DIFFERENT * blur)
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for seen in seen.into_iter().flatten() {
+        sum += weight(seen) * seen.0;
+        weights += weight(seen);
+    }
+    let blur = sum / weights;
+    (weights > 0.0).then_some((blur, DIFFERENT * blur))
 }
 
 /// Whether edges are no blurred steps, from their misfits.

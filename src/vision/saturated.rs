@@ -91,8 +91,10 @@ fn trace_plainly<T: Grey>(
     table: &StepTable,
     scene: &Scene<'_, T>,
 ) -> Result<(), Reject> {
-    let traced = tracer.blur().is_some_and(|blur| tracer.trace(table, scene, blur));
-    if traced { Ok(()) } else { Err(Reject::NoPair { got: 0.0, need: 1.0 }) }
+    if let Some(blur) = tracer.blur() {
+        tracer.trace(table, scene, blur);
+    }
+    if tracer.is_located() { Ok(()) } else { Err(Reject::NoPair { got: 0.0, need: 1.0 }) }
 }
 
 fn blinded(visible: f64) -> Reject {

@@ -128,6 +128,8 @@ pub struct Tracer {
     unfit: f64,
     /// Whether the edge seems to be covered in part.
     suspect: bool,
+    /// Whether its places are known.
+    located: bool,
     /// Whether the edge was found to be covered in part, and is located from
     /// its clear rows alone.
     pub covered: bool,
@@ -187,6 +189,11 @@ impl Tracer {
         &mut self.edges
     }
 
+    /// Whether the edge's places are known.
+    pub fn is_located(&self) -> bool {
+        self.located
+    }
+
     /// Whether the edge seems to be covered and no clear rows were found.
     pub fn is_hidden(&self) -> bool {
         self.suspect && !self.covered
@@ -214,7 +221,10 @@ impl Tracer {
         self.edges.clear();
         self.seen = None;
         self.path.clear();
-        self.suspect = false;
+        // Until it is seen, it is hidden.
+        self.suspect = true;
+        self.located = false;
+        self.misfit = f64::INFINITY;
         self.covered = false;
         self.sort_rows = false;
         self.clear.clear();
@@ -253,25 +263,20 @@ impl Tracer {
     }
 
     /// Locates the edge that was looked at, with what is known of its blur:
-    /// mean and standard deviation \[px\]. Returns whether there is one.
+    /// mean and standard deviation \[px\].
     #[inline(always)]
     pub fn trace<T: Grey>(
         &mut self,
         table: &StepTable,
         scene: &Scene<'_, T>,
         blur: (f64, f64),
-    ) -> bool {
-        if !self.trace_open(table, scene, blur) {
-            return false;
-        }
-        self.suspect = self.unfit > COVERED_SHARE;
+    ) {
+        self.located = self.trace_open(table, scene, blur);
+        self.suspect = !self.located || self.unfit > COVERED_SHARE;
         if self.suspect {
             self.covered = self.uncover(table, scene) && self.misfit < CLEAR_FIT;
-            if !self.covered {
-                return self.trace_again(table, scene, blur);
-            }
+            self.located = self.covered || self.trace_again(table, scene, blur);
         }
-        true
     }
 
     /// Locates the edge as if nothing covered it.

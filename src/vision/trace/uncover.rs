@@ -109,14 +109,14 @@ impl Tracer {
         table: &StepTable,
         scene: &Scene<'_, T>,
         (blur, places): ((f64, f64), &[f32]),
-    ) -> bool {
+    ) {
         self.look_row_by_row();
         self.free.clear();
         self.free.extend_from_slice(places);
         self.covered = self.try_course(table, scene).is_some()
             && self.finish(table, scene)
             && self.misfit < CLEAR_FIT;
-        self.covered || self.trace_again(table, scene, blur)
+        self.located = self.covered || self.trace_again(table, scene, blur);
     }
 
     /// Takes out the few places that lie far from the course on which the others
