@@ -9,8 +9,8 @@ use crate::geometry::{ImagePoint, Roi};
 
 use super::gauge::Axis;
 
-/// Side of the squares in which a region is turned, so that both its reading
-/// and its writing stay in the cache.
+/// Side of the squares in which a region is turned: a row of one fits a register,
+/// and reading and writing stay in the cache.
 const TILE: usize = 16;
 
 /// The gauge laid over an image.
@@ -213,21 +213,50 @@ fn lay<'a, T: Grey>(
     Strip { values, stride, across: view.across, along: view.along, white, scale }
 }
 
-/// Writes columns of the region as rows.
+/// Writes columns of the region as rows, tile by tile; what is left at the ends
+/// pixel by pixel.
 fn turn<T: Grey>(values: &[T], image_width: usize, view: &View, memory: &mut Vec<T>) {
     memory.resize(view.across * view.along, T::default());
-    for u_tile in (0..view.across).step_by(TILE) {
-        let u_end = (u_tile + TILE).min(view.across);
-        for v_tile in (0..view.along).step_by(TILE) {
-            let v_end = (v_tile + TILE).min(view.along);
-            for v in v_tile..v_end {
-                let row = &mut memory[v * view.across..][..view.across];
-                for u in u_tile..u_end {
-                    row[u] = values[u * image_width + v];
-                }
+    let whole = |side: usize| side - side % TILE;
+    for u in (0..whole(view.across)).step_by(TILE) {
+        for v in (0..whole(view.along)).step_by(TILE) {
+            let mut tile = [[T::default(); TILE]; TILE];
+            for (k, row) in tile.iter_mut().enumerate() {
+                row.copy_from_slice(&values[(u + k) * image_width + v..][..TILE]);
+            }
+            let tile = transposed(tile);
+            for (k, row) in tile.iter().enumerate() {
+                memory[(v + k) * view.across + u..][..TILE].copy_from_slice(row);
             }
         }
     }
+    for v in 0..view.along {
+        let from = if v < whole(view.along) { whole(view.across) } else { 0 };
+        for u in from..view.across {
+            memory[v * view.across + u] = values[u * image_width + v];
+        }
+    }
+}
+
+/// Rows become columns: each round interleaves the rows of the two halves, which
+/// processors do for whole rows at once.
+#[inline(always)]
+fn transposed<T: Grey>(mut tile: [[T; TILE]; TILE]) -> [[T; TILE]; TILE] {
+    const HALF: usize = TILE / 2;
+    for _ in 0..TILE.ilog2() {
+        let mut next = [[T::default(); TILE]; TILE];
+        for i in 0..HALF {
+            let (one, other) = (&tile[i], &tile[i + HALF]);
+            for k in 0..HALF {
+                next[2 * i][2 * k] = one[k];
+                next[2 * i][2 * k + 1] = other[k];
+                next[2 * i + 1][2 * k] = one[k + HALF];
+                next[2 * i + 1][2 * k + 1] = other[k + HALF];
+            }
+        }
+        tile = next;
+    }
+    tile
 }
 
 #[cfg(test)]
@@ -240,7 +269,7 @@ mod tests {
         Frame::new(0, Stamp::START, (30, 20), Pixels::Grey8(values)).unwrap()
     }
 
-    const ROI: Roi = Roi { x: 5, y: 4, width: 21, height: 10 };
+    const ROI: Roi = Roi { x: 5, y: 4, width: 21, height: 16 };
 
     #[test]
     fn a_horizontal_bead_is_a_vertical_one_on_its_side() {

@@ -265,12 +265,7 @@ impl Tracer {
     /// Locates the edge that was looked at, with what is known of its blur:
     /// mean and standard deviation \[px\].
     #[inline(always)]
-    pub fn trace<T: Grey>(
-        &mut self,
-        table: &StepTable,
-        scene: &Scene<'_, T>,
-        blur: (f64, f64),
-    ) {
+    pub fn trace<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>, blur: (f64, f64)) {
         self.located = self.trace_open(table, scene, blur);
         self.suspect = !self.located || self.unfit > COVERED_SHARE;
         if self.suspect {
