@@ -391,7 +391,7 @@ impl Work {
     fn sort_out(&mut self) -> Result<(), Reject> {
         let mut worst: f64 = 0.0;
         for side in [&mut self.left, &mut self.right] {
-            if side.covered {
+            if side.is_covered() {
                 side.drop_strays(self.least_off_px);
             }
             let edges = side.edges_mut();
@@ -462,7 +462,7 @@ impl Work {
     /// run.
     fn check_covered(&self, found: &WidthMeasurement) -> Result<(), Reject> {
         let share = found.sigma.get() / found.width.get();
-        let sparse = |side: &Tracer| side.covered && side.used_share() < PLENTY_CLEAR;
+        let sparse = |side: &Tracer| side.is_covered() && side.used_share() < PLENTY_CLEAR;
         let unsure = sparse(&self.left) || sparse(&self.right);
         if unsure && share * f64::from(self.width_px) > COVERED_SIGMA_PX {
             let got = self.left.used_share().min(self.right.used_share());
@@ -474,7 +474,7 @@ impl Work {
 
 /// Share of the rows from which an edge must come.
 fn need_of(side: &Tracer) -> f64 {
-    if side.covered { NEED_CLEAR_ROWS } else { NEED_ROWS }
+    if side.is_covered() { NEED_CLEAR_ROWS } else { NEED_ROWS }
 }
 
 /// Blur that both edges have, seen through one lens, and how far one may differ

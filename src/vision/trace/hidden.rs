@@ -1,6 +1,8 @@
 //! An edge one side of which passes the end of the camera's scale.
 
-use super::{Extent, Located, MAX_PASSES, NEAR_ENOUGH, Scene, Step, Tracer, narrow, typical};
+use super::{
+    Extent, Located, MAX_PASSES, NEAR_ENOUGH, Scene, State, Step, Tracer, narrow, typical,
+};
 use crate::vision::cut_off;
 use crate::vision::path;
 use crate::vision::pool;
@@ -82,6 +84,7 @@ impl Tracer {
         self.common_variance = found.variance + per_level * doubt / (after - before).powi(2);
         self.course.adopt(narrow(found.step.at), (0.0, 1.0));
         self.locate_cut_off(table, scene, &task, &found);
+        self.state = State::Open;
         Some(found)
     }
 

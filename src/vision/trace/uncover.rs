@@ -1,7 +1,7 @@
 //! An edge that grains or spots cover in part: which rows show it and nothing
 //! else. All that is known of it is taken from those rows alone.
 
-use super::{CLEAR_FIT, MANY_SIGMA, Tracer, narrow, typical};
+use super::{CLEAR_FIT, MANY_SIGMA, State, Tracer, narrow, typical};
 use crate::vision::agree::agree;
 use crate::vision::overlay::{Extent, Shape};
 use crate::vision::path;
@@ -113,10 +113,11 @@ impl Tracer {
         self.look_row_by_row();
         self.free.clear();
         self.free.extend_from_slice(places);
-        self.covered = self.try_course(table, scene).is_some()
-            && self.finish(table, scene)
-            && self.misfit < CLEAR_FIT;
-        self.located = self.covered || self.trace_again(table, scene, blur);
+        if self.try_course(table, scene).is_some() && self.finish(table, scene) {
+            self.state = State::Covered;
+        } else {
+            self.trace_again(table, scene, blur);
+        }
     }
 
     /// Takes out the few places that lie far from the course on which the others
@@ -145,7 +146,7 @@ impl Tracer {
         }
     }
 
-    /// Locates the edge from its clear rows.
+    /// Locates the edge from its clear rows. Returns whether they show one.
     #[inline(never)]
     fn finish<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
         let Some(shape) = self.read_shape(table, scene) else { return false };
@@ -155,7 +156,7 @@ impl Tracer {
         self.hold(scene);
         self.gather(scene);
         self.locate(scene, shape.step.blur);
-        true
+        self.misfit < CLEAR_FIT
     }
 
     /// Tells the clear rows along the course that most of the free bands agree

@@ -1,0 +1,84 @@
+//! Levels on either side of an edge, band by band.
+
+use super::{Scene, Tracer};
+use crate::vision::path;
+use crate::vision::strip::Grey;
+
+/// Where levels are picked first: distance from the edge, and apart \[px\].
+const PICK: (f32, f32) = (5.0, 3.0);
+
+impl Tracer {
+    /// Levels on either side of the edge in every band, as the median of a few
+    /// places in its profile and of its neighbours.
+    #[inline(always)]
+    pub(super) fn pick_levels<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        self.pick_raw_levels(scene);
+        path::median_of_three(&mut self.before);
+        path::median_of_three(&mut self.step);
+        path::smooth(&self.before, &mut self.rough);
+        std::mem::swap(&mut self.before, &mut self.rough);
+        path::smooth(&self.step, &mut self.rough);
+        std::mem::swap(&mut self.step, &mut self.rough);
+        self.steady_steps();
+    }
+
+    /// The same, each band for itself.
+    pub(super) fn pick_raw_levels<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        self.before.clear();
+        self.step.clear();
+        let inside = 0.45 * scene.width_px;
+        let (room_before, room_after) =
+            if scene.bead_after { (f32::INFINITY, inside) } else { (inside, f32::INFINITY) };
+        let (left, right) = (picked(-1.0, room_before), picked(1.0, room_after));
+        let unit = scene.bands.unit();
+        for (band, &at) in self.path.iter().enumerate() {
+            let profile = scene.bands.profile(band);
+            #[expect(clippy::cast_possible_truncation, reason = "a place in the gauge")]
+            let at = (at + 0.5) as isize;
+            let before = unit * level(profile, at, left);
+            self.before.push(before);
+            self.step.push(unit * level(profile, at, right) - before);
+        }
+    }
+
+    /// Steps that are small or turned over against the others are not believed.
+    pub(super) fn steady_steps(&mut self) {
+        self.sorted.clear();
+        self.sorted.extend_from_slice(&self.step);
+        let middle = self.sorted.len() / 2;
+        let typical = *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let typical = if typical.abs() < 1.0 { 1.0f32.copysign(typical) } else { typical };
+        for step in &mut self.step {
+            if *step / typical < 0.3 {
+                *step = 0.3 * typical;
+            }
+        }
+    }
+}
+
+/// Distances from an edge at which its level on one side is picked \[px\].
+#[expect(clippy::cast_possible_truncation, reason = "a few pixels")]
+fn picked(sign: f32, room: f32) -> [isize; 5] {
+    let near = PICK.0.min(0.4 * room);
+    let apart = PICK.1.min((room - near) / 5.0);
+    [0.0, 1.0, 2.0, 3.0, 4.0].map(|k| (sign * (near + k * apart)).round() as isize)
+}
+
+/// Level at such distances from an edge: the median of five places.
+#[inline(always)]
+fn level(profile: &[u16], at: isize, distances: [isize; 5]) -> f32 {
+    let last = profile.len() - 1;
+    median_of_five(distances.map(|distance| {
+        let place = usize::try_from(at + distance).unwrap_or(0).min(last);
+        f32::from(profile[place])
+    }))
+}
+
+#[inline(always)]
+fn median_of_five(values: [f32; 5]) -> f32 {
+    let [first, second, third, fourth, last] = values;
+    let low = first.min(second).max(third.min(fourth));
+    let high = first.max(second).min(third.max(fourth));
+    // The extremes of the four are out; the last lies among the rest.
+    low.min(high).max(last.min(low.max(high)))
+}

@@ -1,0 +1,209 @@
+//! The rows of an edge, each held against it: where it shows the edge, and
+//! whether it shows anything else.
+
+use nalgebra::Matrix3;
+
+use super::bands::BandSums;
+use super::{MANY_SIGMA, Scene, Tracer, float, narrow};
+use crate::vision::pool;
+use crate::vision::strip::Grey;
+use crate::vision::template::{Expected, PlainSums, RowSums, Template};
+
+/// A row that fits worse than the median by so many times does not count.
+const UNLIKE: f32 = 2.5;
+/// Rows of a band may differ by this much beside their noise \[px\].
+const WAVY_PX: f32 = 0.5;
+/// Wild pixels that a row may have; more are a grain.
+const FEW_WILD: f32 = 2.0;
+/// By how much the squares that a row leaves exceed what may be noise, where it
+/// is covered for certain.
+const UNFIT: f32 = 1.5;
+
+/// A few rows that are held against the edge together.
+#[derive(Debug, Clone, Copy)]
+pub struct Group {
+    /// The band that they belong to.
+    pub band: usize,
+    /// Number of rows.
+    pub weight: f32,
+    /// How far the rows were sampled beyond the path \[px\].
+    pub ahead: f32,
+    /// What they say.
+    pub sums: RowSums,
+    /// Place of the edge beside the path \[px\].
+    pub moved: f32,
+    /// Sum of the squares of what does not fit, as if of a single row
+    /// \[grey levels²\].
+    pub misfit: f32,
+}
+
+impl Tracer {
+    /// Holds every window against the edge.
+    #[inline(always)]
+    pub(super) fn hold<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        let stiffness = narrow(self.template.products.slope_slope);
+        self.groups.clear();
+        self.plain.clear();
+        self.plain.resize(scene.lines.len(), PlainSums::default());
+        for (number, window) in self.sheet.windows().iter().enumerate() {
+            let (band, weight) = (window.line, window.rows);
+            if self.clear.get(number) == Some(&false) {
+                self.groups.push(Group::hidden(band, weight));
+                continue;
+            }
+            let [path, before, step] = self.course.at(window.middle);
+            let noise = self.pixel_variance(scene, weight).sqrt();
+            let expected = Self::expected([path, before, step], noise);
+            let pixels = (self.sheet.pixels(number).as_slice(), window.first);
+            let sums = self.template.hold(pixels, &expected, &mut self.plain[band]);
+            let sums = sums.unwrap_or(RowSums::OUT_OF_SIGHT);
+            let ahead = expected.at - path;
+            let moved = ahead - sums.slope / (step * stiffness);
+            let misfit = self.misfit(&sums, weight);
+            self.groups.push(Group { band, weight, ahead, sums, moved, misfit });
+        }
+    }
+
+    /// What the mean of some rows is held against, whose pixels have a noise.
+    #[inline(always)]
+    pub(super) fn expected([path, before, step]: [f32; 3], noise: f32) -> Expected {
+        let noise = MANY_SIGMA * noise;
+        Expected {
+            at: Template::sampled(path),
+            before,
+            step,
+            tolerance: noise + 0.05 * step.abs(),
+            tolerance_at_step: noise + 0.15 * step.abs(),
+        }
+    }
+
+    /// Sum of the squares of what does not fit, as if of a single row, so that
+    /// groups of all sizes compare \[grey levels²\].
+    #[inline(always)]
+    pub(super) fn misfit(&self, sums: &RowSums, weight: f32) -> f32 {
+        if sums.wild > FEW_WILD {
+            return f32::INFINITY;
+        }
+        // Weights that know a texture are not the slope of the step.
+        if self.texture.is_some() {
+            return weight * sums.squares;
+        }
+        let stiffness = narrow(self.template.products.slope_slope);
+        weight * (sums.squares - sums.slope * sums.slope / stiffness)
+    }
+
+    /// Sums up the rows of each band, without those on which a grain or a
+    /// spark lies.
+    #[inline(always)]
+    pub(super) fn gather<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        let products = self.template.products;
+        self.sorted.clear();
+        self.sorted.extend(self.groups.iter().map(|group| group.misfit));
+        if !self.clear.is_empty() {
+            // What is hidden says nothing.
+            self.sorted.retain(|misfit| misfit.is_finite());
+        }
+        if self.sorted.is_empty() {
+            self.sorted.push(f32::INFINITY);
+        }
+        let middle = self.sorted.len() / 2;
+        let median = *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let pixels = narrow(products.pixels);
+        let together = self.groups.iter().fold(1.0, |most: f32, group| most.max(group.weight));
+        let variance = together * self.pixel_variance(scene, together);
+        let alike = self.texture.map_or(1.0, |texture| narrow(texture.pixels_alike()));
+        let limit = variance * (pixels + MANY_SIGMA * (2.0 * pixels * alike).sqrt());
+        let limit = limit.max(UNLIKE * median);
+        self.misfit = f64::from(median / (variance * pixels)).sqrt();
+        let covered =
+            |group: &&Group| group.misfit > UNFIT * limit || group.misfit == f32::INFINITY;
+        let unfit = self.groups.iter().filter(covered).count();
+        self.unfit = float(unfit) / float(self.groups.len().max(1));
+        if self.clear.is_empty() {
+            self.spread_misfits(limit);
+        }
+        self.solved.clear();
+        let mut first = 0;
+        for band in 0..scene.lines.len() {
+            let mut end = first;
+            while end < self.groups.len() && self.groups[end].band == band {
+                end += 1;
+            }
+            let sums = self.gather_band(scene, (band, first..end), limit, &products.matrix());
+            self.solved.push(sums);
+            first = end;
+        }
+    }
+
+    /// Rows next to one that fits badly share its grain or spark.
+    fn spread_misfits(&mut self, limit: f32) {
+        let mut before = 0.0;
+        for k in 0..self.groups.len() {
+            let here = self.groups[k].misfit;
+            let after = self.groups.get(k + 1).map_or(0.0, |group| group.misfit);
+            let beside = f32::max(before, after);
+            if beside > limit {
+                self.groups[k].misfit = here.max(beside);
+            }
+            before = here;
+        }
+    }
+
+    #[inline(always)]
+    fn gather_band<T: Grey>(
+        &mut self,
+        scene: &Scene<'_, T>,
+        (band, groups): (usize, std::ops::Range<usize>),
+        limit: f32,
+        core: &Matrix3<f64>,
+    ) -> BandSums {
+        let stiffness = narrow(core[(0, 0)]);
+        let [_, _, step] = self.course.at(narrow(pool::middle(scene.lines[band])));
+        let groups = &self.groups[groups];
+        self.sorted.clear();
+        let fitting = groups.iter().filter(|group| group.misfit <= limit);
+        self.sorted.extend(fitting.map(|group| group.moved));
+        let typical = median_of_few(&mut self.sorted);
+        let in_texture = self.scatter_in_texture.map(|scatter| narrow(scatter.of_window));
+        let of_window = |weight: f32| {
+            in_texture.unwrap_or(scene.noise * scene.noise / (weight * stiffness)).sqrt()
+        };
+        let widen = |(count, sum): (f32, f32)| (f64::from(count), f64::from(sum));
+        let mut sums = BandSums {
+            step: step.into(),
+            before: widen(self.plain[band].before()),
+            after: widen(self.plain[band].after()),
+            ..BandSums::default()
+        };
+        for group in groups {
+            let far = MANY_SIGMA * of_window(group.weight) / step.abs() + WAVY_PX;
+            let counts = group.misfit <= limit && (group.moved - typical).abs() <= far;
+            sums.all_rows += f64::from(group.weight);
+            if self.clear.is_empty() || group.misfit < f32::INFINITY {
+                sums.held_rows += f64::from(group.weight);
+            }
+            if counts {
+                sums.add(group, core);
+            }
+        }
+        // Plain pixels are those of a group's mean.
+        let weight = f64::from(groups.first().map_or(1.0, |group| group.weight));
+        sums.before = (sums.before.0 * weight, sums.before.1 * weight);
+        sums.after = (sums.after.0 * weight, sums.after.1 * weight);
+        sums
+    }
+}
+
+impl Group {
+    /// Rows that are not to be held.
+    fn hidden(band: usize, weight: f32) -> Self {
+        let (ahead, moved, misfit) = (0.0, 0.0, f32::INFINITY);
+        Self { band, weight, ahead, sums: RowSums::default(), moved, misfit }
+    }
+}
+
+/// Median of a few values, which are sorted; 0 of none.
+fn median_of_few(values: &mut [f32]) -> f32 {
+    values.sort_unstable_by(f32::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
