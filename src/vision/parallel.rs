@@ -120,18 +120,22 @@ impl Parallel {
 mod tests {
     use super::*;
 
+    fn small(number: usize) -> f32 {
+        f32::from(u8::try_from(number).unwrap())
+    }
+
     /// Edges that slant and wave alike, each covered in two bands of three by
     /// steps at other places.
     #[test]
     fn edges_that_are_mostly_covered_are_found_by_their_distance() {
-        let bend = |band: usize| [0.3f32, 0.9, 2.0, 2.4][band % 4] + 0.4 * f32::from(band as u8);
+        let bend = |band: usize| [0.3f32, 0.9, 2.0, 2.4][band % 4] + 0.4 * small(band);
         let left = |band: usize| {
-            let covered = 40.0 + bend(band) - 3.0 - 0.7 * f32::from((band * 5 % 8) as u8);
+            let covered = 40.0 + bend(band) - 3.0 - 0.7 * small(band * 5 % 8);
             let true_one = (band % 3 != 1).then_some(40.0 + bend(band));
             std::iter::once(covered).chain(true_one)
         };
         let right = |band: usize| {
-            let covered = 140.5 + bend(band) + 3.0 + 0.9 * f32::from((band * 7 % 11) as u8);
+            let covered = 140.5 + bend(band) + 3.0 + 0.9 * small(band * 7 % 11);
             let true_one = (band % 3 != 2).then_some(140.5 + bend(band));
             std::iter::once(covered).chain(true_one)
         };

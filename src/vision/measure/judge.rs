@@ -1,0 +1,104 @@
+//! What is not believed: edges that disagree with themselves or with each other,
+//! and steps that are too low.
+
+use super::Work;
+use crate::vision::outlier;
+use crate::vision::reject::Reject;
+use crate::vision::trace::Tracer;
+use crate::vision::width::WidthMeasurement;
+
+/// Share of the rows from which each edge must come.
+const NEED_ROWS: f64 = 0.4;
+/// The same where each row is known to be clear.
+const NEED_CLEAR_ROWS: f64 = 0.16;
+/// Misfit of a blurred step from which on, if both have it, edges are located
+/// line by line: one alone is more likely covered than of another kind.
+const STRANGE: f64 = 2.0;
+/// The same for one edge alone.
+const VERY_STRANGE: f64 = 8.0;
+/// Largest standard deviation of a width whose edges are covered in part
+/// \[px\]: beyond it, what is left of an edge does not tell its course.
+const COVERED_SIGMA_PX: f64 = 0.19;
+/// Share of clear rows from which on an edge's course is sure enough.
+const PLENTY_CLEAR: f64 = 0.6;
+/// Largest scatter of neighbouring edges about each other \[px\] that still is
+/// an edge, not noise.
+const MAX_SCATTER_PX: f64 = 1.5;
+/// The same where one edge was hidden and had to be located line by line.
+const LOST_SCATTER_PX: f64 = 0.5;
+
+impl Work {
+    /// Whether one edge alone is hidden: then it is covered, not of another kind
+    /// than the other one.
+    pub(super) fn one_is_lost(&self) -> bool {
+        let lost = |side: &Tracer| side.is_hidden() && side.misfit > STRANGE;
+        lost(&self.left) != lost(&self.right)
+    }
+
+    /// Takes out calipers that disagree with their neighbours, on either edge.
+    pub(super) fn sort_out(&mut self) -> Result<(), Reject> {
+        let mut worst: f64 = 0.0;
+        for side in [&mut self.left, &mut self.right] {
+            if side.is_covered() {
+                side.drop_strays(self.least_off_px);
+            }
+            let edges = side.edges_mut();
+            worst = worst.max(outlier::sort_out(edges, self.least_off_px, &mut self.scatter));
+        }
+        let got = self.left.used_share().min(self.right.used_share());
+        let enough =
+            [&self.left, &self.right].iter().all(|side| side.used_share() >= need_of(side));
+        let limit = if self.is_lost { LOST_SCATTER_PX } else { MAX_SCATTER_PX };
+        if !enough || worst > limit {
+            let got = if worst > limit { 0.0 } else { got };
+            return Err(Reject::NoPair { got, need: NEED_ROWS });
+        }
+        Ok(())
+    }
+
+    pub(super) fn check_contrast(&mut self) -> Result<(), Reject> {
+        let need = self.gauge.min_contrast_grey;
+        self.contrasts = [self.contrast(true), self.contrast(false)];
+        let got = self.contrasts[0].min(self.contrasts[1]);
+        if got < need {
+            return Err(self.too_much_light().unwrap_or(Reject::LowContrast { got, need }));
+        }
+        Ok(())
+    }
+
+    /// Median height of an edge's steps \[grey levels\].
+    fn contrast(&mut self, left: bool) -> f64 {
+        let side = if left { &self.left } else { &self.right };
+        self.scatter.clear();
+        self.scatter.extend(side.edges().iter().flatten().map(|edge| edge.height.abs()));
+        let middle = self.scatter.len() / 2;
+        if self.scatter.is_empty() {
+            return 0.0;
+        }
+        *self.scatter.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+
+    /// Refuses a bead of whose edges too little is uncovered to tell where they
+    /// run.
+    pub(super) fn check_covered(&self, found: &WidthMeasurement) -> Result<(), Reject> {
+        let share = found.sigma.get() / found.width.get();
+        let sparse = |side: &Tracer| side.is_covered() && side.used_share() < PLENTY_CLEAR;
+        let unsure = sparse(&self.left) || sparse(&self.right);
+        if unsure && share * f64::from(self.width_px) > COVERED_SIGMA_PX {
+            let got = self.left.used_share().min(self.right.used_share());
+            return Err(Reject::NoPair { got, need: NEED_ROWS });
+        }
+        Ok(())
+    }
+}
+
+/// Share of the rows from which an edge must come.
+fn need_of(side: &Tracer) -> f64 {
+    if side.is_covered() { NEED_CLEAR_ROWS } else { NEED_ROWS }
+}
+
+/// Whether edges are no blurred steps, from their misfits.
+pub fn is_strange(misfits: [f64; 2]) -> bool {
+    misfits.iter().all(|&misfit| misfit > STRANGE)
+        || misfits.iter().any(|&misfit| misfit > VERY_STRANGE)
+}

@@ -1,0 +1,123 @@
+//! The bead's two edges, from their contours to sub-pixel places: each in the
+//! way that suits it.
+
+use super::judge::is_strange;
+use super::search::Found;
+use super::{NEED_SHARE, OFF_PX, Work};
+use crate::vision::covered;
+use crate::vision::noise;
+use crate::vision::reject::Reject;
+use crate::vision::saturated;
+use crate::vision::strip::{Grey, Strip};
+use crate::vision::trace::Scene;
+
+/// Least deviation that makes an outlier of a caliper line that was fitted for
+/// itself \[px\].
+const LINE_OFF_PX: f64 = 0.75;
+/// Ground on either side of the bead that its noise is taken from \[px\].
+const BESIDE_PX: f32 = 12.0;
+/// Share by which the blur of one edge differs from the other's.
+const DIFFERENT: f64 = 0.04;
+
+impl Work {
+    #[inline(always)]
+    pub(super) fn trace<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        pair: Found,
+    ) -> Result<(), Reject> {
+        let (lefts, rights) = pair.sides(&self.ups, &self.downs);
+        let (lefts, rights) = (&lefts.all()[pair.pair.left].at, &rights.all()[pair.pair.right].at);
+        let about = about(lefts, rights, strip.across);
+        self.noise = noise::of(strip, about);
+        self.width_px = narrowest(lefts, rights, &mut self.memory);
+        let scene = Scene {
+            strip,
+            bands: &self.bands,
+            lines: &self.lines,
+            noise: self.noise,
+            width_px: self.width_px,
+            bead_after: true,
+        };
+        let right_scene = Scene { bead_after: false, ..scene };
+        let scenes = [scene, right_scene];
+        let mut seen = [None; 2];
+        self.is_lost = false;
+        // A loop, so that what is inlined into it is compiled once for both.
+        let sides = [(&mut self.left, lefts), (&mut self.right, rights)];
+        for ((tracer, rough), (scene, seen)) in sides.into_iter().zip(scenes.iter().zip(&mut seen))
+        {
+            *seen = tracer.look(&self.table, scene, rough.iter().copied());
+        }
+        let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
+        if let [Some(_), Some(_)] = seen {
+            let cut_off = [self.left.is_cut_off(&scene), self.right.is_cut_off(&right_scene)];
+            if cut_off != [[false; 2]; 2] {
+                self.least_off_px = OFF_PX;
+                let tracers = [&mut self.left, &mut self.right];
+                let bead = saturated::Bead { scenes, lefts, rights };
+                self.noise = bead.trace(tracers, &self.table, cut_off)?;
+                return Ok(());
+            }
+        }
+        if let Some(blur) = common_blur(seen) {
+            for (tracer, scene) in [&mut self.left, &mut self.right].into_iter().zip(&scenes) {
+                tracer.trace(&self.table, scene, blur);
+            }
+            if self.left.is_hidden() || self.right.is_hidden() {
+                let candidates = &self.candidates;
+                let bead = covered::Bead { scenes, candidates, bright: pair.bright };
+                let tracers = [&mut self.left, &mut self.right];
+                bead.uncover(tracers, &self.table, blur, &mut self.parallel);
+            }
+            self.is_lost = self.one_is_lost();
+            let found = self.left.is_located() && self.right.is_located();
+            if found && !self.is_lost && !is_strange([self.left.misfit, self.right.misfit]) {
+                self.least_off_px = OFF_PX;
+                return Ok(());
+            }
+        }
+        self.least_off_px = LINE_OFF_PX;
+        let left = self.left.refine(&self.table, &scene);
+        let right = self.right.refine(&self.table, &right_scene);
+        if left && right { Ok(()) } else { Err(failed) }
+    }
+}
+
+/// Blur that both edges have, seen through one lens, and how far one may differ
+/// from it \[px\], from that of each and its standard deviation; `None` where
+/// neither has one.
+fn common_blur(seen: [Option<(f64, f64)>; 2]) -> Option<(f64, f64)> {
+    let weight = |(blur, sd): (f64, f64)| 1.0 / (sd * sd + (DIFFERENT * blur).powi(2));
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for seen in seen.into_iter().flatten() {
+        sum += weight(seen) * seen.0;
+        weights += weight(seen);
+    }
+    let blur = sum / weights;
+    (weights > 0.0).then_some((blur, DIFFERENT * blur))
+}
+
+/// Columns of the bead and a little beside it.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "saturates at 0 and is cut to the gauge"
+)]
+fn about(left: &[Option<f32>], right: &[Option<f32>], across: usize) -> std::ops::Range<usize> {
+    let low = left.iter().flatten().fold(f32::INFINITY, |low, &at| low.min(at));
+    let high = right.iter().flatten().fold(0.0, |high: f32, &at| high.max(at));
+    let (from, to) = ((low - BESIDE_PX) as usize, (high + BESIDE_PX) as usize);
+    from.min(across - 1)..to.clamp(from + 1, across)
+}
+
+/// A narrow distance between two contours \[px\], for the size of windows.
+fn narrowest(left: &[Option<f32>], right: &[Option<f32>], memory: &mut Vec<f32>) -> f32 {
+    memory.clear();
+    memory.extend(left.iter().zip(right).filter_map(|(left, right)| Some((*right)? - (*left)?)));
+    let rank = memory.len() / 10;
+    if memory.is_empty() {
+        return 0.0;
+    }
+    *memory.select_nth_unstable_by(rank, f32::total_cmp).1
+}

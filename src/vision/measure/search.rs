@@ -1,0 +1,135 @@
+//! The search for the bead: candidates, contours, and the pair of them that is
+//! the bead's two edges.
+
+use super::{NEED_SHARE, Work};
+use crate::calib::SurfaceMap;
+use crate::vision::contour::Contours;
+use crate::vision::edge::{Candidates, REACH, respond};
+use crate::vision::gauge::Polarity;
+use crate::vision::pair::{self, Pair, Search};
+use crate::vision::pool::Bands;
+use crate::vision::reject::Reject;
+use crate::vision::strip::View;
+
+/// Share from which a contour is looked at.
+const LEAST_SHARE: f64 = 0.4;
+/// Share of saturated pixels from which missing contrast is laid to light.
+const MUCH_LIGHT: f64 = 0.3;
+/// Room that a search allows beyond the range of widths, for the difference
+/// between one caliper and the mean of all.
+const RANGE_SLACK: f64 = 1.5;
+/// Steps that noise alone makes are passed over up to so many of its standard
+/// deviations.
+const FLOOR_SIGMA: f32 = 3.5;
+
+/// A pair and its polarity.
+#[derive(Debug, Clone, Copy)]
+pub struct Found {
+    /// The pair.
+    pub pair: Pair,
+    /// Whether the bead is brighter than what lies beside it.
+    pub bright: bool,
+}
+
+impl Found {
+    /// Contours of left and right edges.
+    pub fn sides<'a>(
+        &self,
+        ups: &'a Contours,
+        downs: &'a Contours,
+    ) -> (&'a Contours, &'a Contours) {
+        if self.bright { (ups, downs) } else { (downs, ups) }
+    }
+}
+
+impl Work {
+    #[inline(always)]
+    pub(super) fn find_candidates(&mut self) {
+        // A step is the difference of two means of REACH pooled pixels.
+        #[expect(clippy::cast_precision_loss, reason = "REACH is small")]
+        let noise = self.noise * (2.0 / (4.0 * REACH as f32)).sqrt();
+        #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
+        let least = (0.4 * self.gauge.min_contrast_grey) as f32;
+        let floor = least.max(FLOOR_SIGMA * noise);
+        #[expect(clippy::cast_precision_loss, reason = "REACH is small")]
+        let unit = self.bands.unit() / REACH as f32;
+        self.candidates.clear();
+        for band in 0..self.bands.count() {
+            let profile = self.bands.profile(band);
+            self.response.resize(profile.len(), 0);
+            respond(profile, &mut self.response);
+            self.candidates.push(Candidates::find(&self.response, floor, unit));
+        }
+        #[expect(clippy::cast_precision_loss, reason = "a band has few rows")]
+        let band_px = strip_rows(&self.bands) as f32 / self.bands.count().max(1) as f32;
+        self.ups.search(&self.candidates, true, band_px, LEAST_SHARE);
+        self.downs.search(&self.candidates, false, band_px, LEAST_SHARE);
+    }
+
+    /// The believed widths in pixels across the gauge's middle.
+    pub(super) fn search_range(
+        &self,
+        view: &View,
+        surface: &SurfaceMap,
+    ) -> Result<(f32, f32), Reject> {
+        #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+        let (u, v) = (view.across as f64 / 2.0, view.along as f64 / 2.0);
+        let middle = surface.to_mm(view.to_image(u, v)).ok_or(Reject::OffSurface)?;
+        let beside = surface.to_mm(view.to_image(u + 1.0, v)).ok_or(Reject::OffSurface)?;
+        let mm_per_px = (beside - middle).norm();
+        let (min, max) = self.gauge.width_range;
+        #[expect(clippy::cast_possible_truncation, reason = "widths in pixels")]
+        let range = (
+            (min.get() / mm_per_px / RANGE_SLACK) as f32,
+            (max.get() / mm_per_px * RANGE_SLACK) as f32,
+        );
+        Ok(range)
+    }
+
+    /// The bead's two edges among the contours.
+    pub(super) fn find_pair(&mut self, width_px: (f32, f32)) -> Result<Found, Reject> {
+        let found = self.search(width_px);
+        if let Some(found) = found.filter(|found| found.pair.share >= NEED_SHARE) {
+            return Ok(found);
+        }
+        let got = found.map_or(0.0, |found| found.pair.share);
+        let refused = Reject::NoPair { got, need: NEED_SHARE };
+        // A bead of another width deserves to be called that.
+        let least = self.gauge.min_contrast_grey;
+        let strong =
+            |found: &Found| found.pair.share >= NEED_SHARE && f64::from(found.pair.step) >= least;
+        match self.search((4.0, f32::MAX)).filter(strong) {
+            Some(found) => Ok(found),
+            None => Err(self.too_much_light().unwrap_or(refused)),
+        }
+    }
+
+    fn search(&mut self, width_px: (f32, f32)) -> Option<Found> {
+        let search = Search { width_px };
+        let mut best: Option<Found> = None;
+        for bright in [true, false] {
+            let unwanted = if bright { Polarity::Dark } else { Polarity::Bright };
+            if self.gauge.polarity == unwanted {
+                continue;
+            }
+            let (lefts, rights) =
+                if bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
+            let pair = pair::find(lefts, rights, search, &mut self.memory);
+            best = match (best, pair) {
+                (Some(best), Some(pair)) if best.pair.score >= pair.score => Some(best),
+                (best, None) => best,
+                (_, Some(pair)) => Some(Found { pair, bright }),
+            };
+        }
+        best
+    }
+
+    pub(super) fn too_much_light(&self) -> Option<Reject> {
+        let got = self.bands.saturated_share();
+        (got > MUCH_LIGHT).then_some(Reject::Saturated { got, limit: MUCH_LIGHT })
+    }
+}
+
+fn strip_rows(bands: &Bands) -> usize {
+    bands.count().checked_sub(1).map_or(0, |last| bands.rows(last).1)
+}
