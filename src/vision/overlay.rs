@@ -344,3 +344,6 @@ fn place(index: usize) -> f64 {
 fn index(distance: f64) -> usize {
     (distance + REACH as f64).clamp(0.0, SPAN as f64) as usize
 }
+
+#[cfg(test)]
+mod tests;

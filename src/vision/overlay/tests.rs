@@ -1,0 +1,93 @@
+use super::*;
+use crate::frame::{Frame, Pixels};
+use crate::geometry::Roi;
+use crate::time::Stamp;
+use crate::vision::gauge::Axis;
+use crate::vision::step::StepTable;
+use crate::vision::strip::{Strips, Turner, View};
+
+const ROWS: usize = 100;
+const COLUMNS: usize = 160;
+const LINES: [(usize, usize); 4] = [(0, 25), (25, 50), (50, 75), (75, 100)];
+const BLUR_PX: f64 = 1.6;
+/// Standard deviation of a pixel of 8 bits in shares of a step of 80 levels.
+const NOISE: f64 = 0.05;
+
+/// A path that lies a little off the edge.
+struct Straight;
+
+impl Path for Straight {
+    fn expected(&self, _: f32) -> [f32; 3] {
+        [79.8, 70.0, 80.0]
+    }
+}
+
+/// A step from 70 to 150 at 80.3 px and what lies beside it, without noise.
+fn overlay(beside: impl Fn(f64) -> f64) -> Overlay {
+    let table = StepTable::default();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 16 bits")]
+    let shown = |x: u16| {
+        let away = f64::from(x) - 80.3;
+        let level = 70.0 + 80.0 * table.at(away / BLUR_PX).0 + beside(away);
+        (level * 257.0).round() as u16
+    };
+    let columns = u16::try_from(COLUMNS).unwrap();
+    let values = (0..ROWS).flat_map(|_| (0..columns).map(shown)).collect();
+    let frame = Frame::new(0, Stamp::START, (COLUMNS, ROWS), Pixels::Grey16(values)).unwrap();
+    let view = View::new(Roi { x: 0, y: 0, width: COLUMNS, height: ROWS }, Axis::Vertical);
+    let mut turner = Turner::default();
+    let Strips::Words(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
+    let mut sheet = Sheet::default();
+    sheet.read(&strip, &LINES, (0.0, 1), |_| 79.8);
+    let mut overlay = Overlay::default();
+    overlay.lay(&sheet, &Straight);
+    overlay
+}
+
+/// The shape of the edge with its blur known to four percent.
+fn shape(overlay: &Overlay) -> Shape {
+    let table = StepTable::default();
+    let room = Extent { before: 45.0, after: 45.0 };
+    let look = overlay.look(&table, NOISE, room).unwrap();
+    overlay.shape(&table, &look, (look.step.blur, 0.04 * BLUR_PX)).unwrap()
+}
+
+#[test]
+fn a_plain_edge_is_plain_as_far_as_can_be_seen() {
+    let shape = shape(&overlay(|_| 0.0));
+    assert!((shape.step.at - 0.5).abs() < 0.002, "{shape:?}");
+    assert!((shape.step.blur - BLUR_PX).abs() < 0.01, "{shape:?}");
+    assert!(!shape.is_bent());
+    assert!(shape.extent.before > 40.0 && shape.extent.after > 40.0);
+}
+
+/// The shadow's flank, 6 px before the edge, leads the way to a level of 14.
+#[test]
+fn a_shadow_close_by_does_not_move_the_edge() {
+    let table = StepTable::default();
+    for away in [6.0, 8.0] {
+        let dark = |at: f64| -56.0 * table.at(-(at + away) / BLUR_PX).0;
+        let shape = shape(&overlay(dark));
+        assert!((shape.step.at - 0.5).abs() < 0.01, "{shape:?}");
+        assert!((shape.step.before).abs() < 0.01, "{shape:?}");
+        let [before, after] = shape.flanks.0;
+        let flank = before.unwrap();
+        assert!((flank.at - 0.5 + away).abs() < 0.05, "{flank:?}");
+        assert!((flank.height + 0.7).abs() < 0.02, "{flank:?}");
+        assert_eq!(after, None);
+        // What the flank leaves open counts; from 5 blurs on it is little.
+        let sd_px = shape.variance.sqrt();
+        assert!(if away < 7.0 { (0.01..0.2).contains(&sd_px) } else { sd_px < 0.03 }, "{sd_px}");
+    }
+}
+
+/// Light that falls off as exp(−x/30 px), from 1 grey level/px at the edge.
+#[test]
+fn shading_that_falls_off_is_followed_by_a_parabola() {
+    let falling = |at: f64| if at > 0.0 { 30.0 * (1.0 - libm::exp(-at / 30.0)) } else { 0.0 };
+    let shape = shape(&overlay(falling));
+    let [before, after] = shape.shading;
+    assert!((after.slope * 80.0 - 1.0).abs() < 0.15, "{after:?}");
+    assert!(after.bend < 0.0);
+    assert!(before.slope.abs() < 1e-3 && before.bend == 0.0);
+}
