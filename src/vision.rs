@@ -12,6 +12,8 @@
 //! trace    contour → sub-pixel places, one a caliper line, from all rows:
 //!          path, overlay (blur, surroundings), template, bands; texture and
 //!          whiten where the surroundings are not plain
+//! covered  the same for edges that only the other one shows where to look for
+//!          (parallel)
 //! cut_off  the same for edges one side of which passes the end of the
 //!          camera's scale (censor)
 //! refine   the same for edges that are no blurred steps (fit, blur)
