@@ -3,6 +3,7 @@
 //! means and medians of all of them go astray.
 
 use super::normal::Normal;
+use super::number::single;
 
 /// Lines and parabolas that are tried.
 const TRIALS: usize = 160;
@@ -75,24 +76,24 @@ fn search(values: &[f32], tolerance: f32) -> Option<Parabola> {
 
 impl Parabola {
     fn line(values: &[f32], first: usize, third: usize) -> Self {
-        let middle = float(values.len() - 1) / 2.0;
-        let slope = (values[third] - values[first]) / float(third - first);
-        let level = values[first] + slope * (middle - float(first));
+        let middle = single(values.len() - 1) / 2.0;
+        let slope = (values[third] - values[first]) / single(third - first);
+        let level = values[first] + slope * (middle - single(first));
         Self { middle, terms: [level, slope, 0.0] }
     }
 
     /// The parabola that leaves a line's two places where they are and goes
     /// through a third.
     fn bent_to(self, values: &[f32], at: usize, first: usize, third: usize) -> Self {
-        let bend = (values[at] - self.at(at)) / (float(at - first) * -float(third - at));
+        let bend = (values[at] - self.at(at)) / (single(at - first) * -single(third - at));
         // bend · (x − first) · (x − third), about the middle.
-        let (a, b) = (self.middle - float(first), self.middle - float(third));
+        let (a, b) = (self.middle - single(first), self.middle - single(third));
         let [level, slope, _] = self.terms;
         Self { terms: [level + bend * a * b, slope + bend * (a + b), bend], ..self }
     }
 
     fn at(&self, k: usize) -> f32 {
-        let x = float(k) - self.middle;
+        let x = single(k) - self.middle;
         let [level, slope, bend] = self.terms;
         level + x * (slope + x * bend)
     }
@@ -113,7 +114,7 @@ impl Parabola {
         for (k, &value) in values.iter().enumerate() {
             let miss = value - self.at(k);
             if miss.abs() <= tolerance {
-                let x = f64::from(float(k) - self.middle);
+                let x = f64::from(single(k) - self.middle);
                 normal.add([1.0, x, x * x], miss.into(), 1.0);
             }
         }
@@ -134,20 +135,15 @@ impl Parabola {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "there are few values")]
-fn float(number: usize) -> f32 {
-    number as f32
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn check(of: impl Fn(f32) -> f32) {
-        let mut values: Vec<f32> = (0..30).map(|k| of(float(k))).collect();
+        let mut values: Vec<f32> = (0..30).map(|k| of(single(k))).collect();
         let wrong = [1, 2, 3, 9, 10, 14, 15, 16, 17, 22, 25, 26, 28];
         for (n, &k) in wrong.iter().enumerate() {
-            values[k] += 1.5 + 0.3 * float(n);
+            values[k] += 1.5 + 0.3 * single(n);
         }
         values[5] = f32::NAN;
         assert_eq!(agree(&mut values, 0.8), 30 - wrong.len() - 1);

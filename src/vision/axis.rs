@@ -10,6 +10,7 @@ use crate::units::Mm;
 
 use super::curve::{Curve, Point};
 use super::gauge::Gauge;
+use super::number::float;
 use super::reject::Reject;
 use super::scatter;
 use super::strip::View;
@@ -133,7 +134,7 @@ impl Side<'_> {
     /// here and there may hide anything.
     fn most_inflation(&self) -> f64 {
         let seen: f64 = self.places.iter().flatten().map(|located| located.share).sum();
-        if seen < ALL_BUT_FEW * count(self.places.len()) {
+        if seen < ALL_BUT_FEW * float(self.places.len()) {
             return f64::INFINITY;
         }
         HIDDEN + ALONG * (self.misfit * self.misfit - 1.0).max(0.0)
@@ -462,7 +463,7 @@ impl Spread {
             .sides
             .iter()
             .map(|side| {
-                let all = count(side.places.len());
+                let all = float(side.places.len());
                 let seen: f64 = side.places.iter().flatten().map(|located| located.share).sum();
                 0.5 * roughness * roughness * (1.0 - seen / all).max(0.0) / f64::max(seen, 1.0)
             })
@@ -493,9 +494,4 @@ fn mean_variance(places: &[Option<Located>]) -> f64 {
         n += 1.0;
     }
     sum / f64::max(n, 1.0)
-}
-
-#[expect(clippy::cast_precision_loss, reason = "there are few bands")]
-fn count(number: usize) -> f64 {
-    number as f64
 }

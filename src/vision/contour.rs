@@ -4,6 +4,8 @@
 //! first, then the strongest of what it leaves.
 
 use super::edge::{Candidate, Candidates, KEPT};
+use super::number::single;
+use super::rank;
 
 /// Contours of one sign that are looked for.
 const MOST: usize = 6;
@@ -93,11 +95,8 @@ impl Contours {
                 self.steps.push(best);
             }
         }
-        if self.steps.is_empty() {
-            return 0.0;
-        }
         let rank = self.steps.len() * 7 / 10;
-        *self.steps.select_nth_unstable_by(rank, f32::total_cmp).1
+        rank::at(&mut self.steps, rank).unwrap_or(0.0)
     }
 
     /// Fills in scores and returns the last step of the best contour.
@@ -119,7 +118,7 @@ impl Contours {
                 let (score, from) = self.best_before(band, step.at, steps, band_px);
                 self.scores[band][index] = score + reward;
                 self.froms[band][index] = from;
-                let total = score + reward - SKIP_COST * float(bands - 1 - band);
+                let total = score + reward - SKIP_COST * single(bands - 1 - band);
                 if total > best_total {
                     best_total = total;
                     best = Some((band, index));
@@ -136,11 +135,11 @@ impl Contours {
         steps: &impl Fn(usize) -> &'a [Candidate],
         band_px: f32,
     ) -> (f32, u16) {
-        let mut best = (-SKIP_COST * float(band), NONE);
+        let mut best = (-SKIP_COST * single(band), NONE);
         for gap in 1..=(MAX_SKIP + 1).min(band) {
             let before = band - gap;
-            let skipped = SKIP_COST * float(gap - 1);
-            let free = FREE_SLOPE * band_px * float(gap) + 1.0;
+            let skipped = SKIP_COST * single(gap - 1);
+            let free = FREE_SLOPE * band_px * single(gap) + 1.0;
             for (index, step) in steps(before).iter().enumerate() {
                 if self.is_used(before, index) {
                     continue;
@@ -178,7 +177,7 @@ impl Contours {
             index = usize::from(from & 0xff);
         }
         contour.step = sum / n;
-        contour.share = f64::from(n) / f64::from(float(self.used.len()));
+        contour.share = f64::from(n) / f64::from(single(self.used.len()));
         contour.wobble = wobble(&contour.at, &mut self.steps);
     }
 }
@@ -188,20 +187,11 @@ fn wobble(at: &[Option<f32>], memory: &mut Vec<f32>) -> f32 {
     memory.extend(
         at.windows(3).filter_map(|three| Some((three[1]? - 0.5 * (three[0]? + three[2]?)).abs())),
     );
-    if memory.is_empty() {
-        return f32::INFINITY;
-    }
-    let middle = memory.len() / 2;
-    *memory.select_nth_unstable_by(middle, f32::total_cmp).1
+    rank::median(memory).unwrap_or(f32::INFINITY)
 }
 
 fn pack(gap: usize, index: usize) -> u16 {
     u16::try_from(gap << 8 | index).unwrap_or(NONE)
-}
-
-#[expect(clippy::cast_precision_loss, reason = "there are few bands")]
-fn float(number: usize) -> f32 {
-    number as f32
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The course of an edge along the gauge as a short polynomial: where it runs
 //! in the mean, in which direction, and how it bends.
 
+use super::number::float;
 use nalgebra::{SMatrix, SVector};
 
 /// Terms that a curve has at most: up to t⁴.
@@ -129,11 +130,6 @@ impl Curve {
 fn legendre(t: f64) -> [f64; MOST] {
     let s = t * t;
     [1.0, t, 1.5 * s - 0.5, t * (2.5 * s - 1.5), (35.0 * s - 30.0) * s / 8.0 + 0.375]
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a small number")]
-fn float(number: usize) -> f64 {
-    number as f64
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use nalgebra::{Matrix2, Vector2};
 use super::censor::{self, Seen};
 use super::normal::Normal;
 use super::overlay::{Overlay, Path, Profile};
+use super::rank;
 use super::sheet::{Sheet, Window};
 use super::step::StepTable;
 
@@ -310,8 +311,9 @@ impl CutOff {
         self.sorted.clear();
         self.sorted.extend(self.rows.iter().map(Row::misfit));
         let middle = self.sorted.len() / 2;
-        let median = *self.sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
-        let noise = 1.0 + MANY_SIGMA * (2.0 / self.rows[middle].pixels.max(1.0)).sqrt();
+        let median = rank::median(&mut self.sorted).unwrap_or(f64::INFINITY);
+        let pixels = self.rows.get(middle).map_or(1.0, |row| row.pixels.max(1.0));
+        let noise = 1.0 + MANY_SIGMA * (2.0 / pixels).sqrt();
         (noise.max(UNLIKE * median), median.sqrt())
     }
 }

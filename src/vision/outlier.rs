@@ -1,5 +1,6 @@
 //! Calipers that disagree with their neighbours: grains, sparks, wrong picks.
 
+use super::rank;
 use super::trace::Located;
 
 /// Distances at which neighbours are asked.
@@ -21,11 +22,8 @@ pub fn sort_out(edges: &mut [Option<Located>], least_px: f64, memory: &mut Vec<f
         }
     }
     let (deviations, sizes) = memory.split_at_mut(edges.len());
-    if sizes.is_empty() {
-        return 0.0;
-    }
-    let middle = sizes.len() / 2;
-    let sigma = 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let Some(median) = rank::median(sizes) else { return 0.0 };
+    let sigma = 1.4826 * median;
     let limit = least_px.max(MANY_SIGMA * sigma);
     for (edge, deviation) in edges.iter_mut().zip(deviations) {
         if deviation.abs() > limit {

@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use super::phase::split;
+use super::rank;
 use super::sheet::Sheet;
 
 mod curved;
@@ -248,11 +249,8 @@ impl Overlay {
         }
         self.sorted.clear();
         self.sorted.extend_from_slice(&self.unlike);
-        if self.sorted.is_empty() {
-            return f32::INFINITY;
-        }
         let rank = rank_of(self.sorted.len(), share);
-        *self.sorted.select_nth_unstable_by(rank, f32::total_cmp).1
+        rank::at(&mut self.sorted, rank).unwrap_or(f32::INFINITY)
     }
 
     /// Means of the rows in several parts along the bead, as grey levels. Only
@@ -326,7 +324,7 @@ impl Overlay {
     reason = "a share of a small number"
 )]
 fn rank_of(count: usize, share: f32) -> usize {
-    ((share * count as f32) as usize).min(count - 1)
+    ((share * count as f32) as usize).min(count.saturating_sub(1))
 }
 
 #[expect(clippy::cast_precision_loss, reason = "the window is short")]

@@ -3,6 +3,7 @@
 //! lies between them.
 
 use super::contour::{Contour, Contours};
+use super::rank;
 
 /// Depth of a gap between two edges, as a share of their step, that shows them
 /// to belong to two beads.
@@ -68,12 +69,10 @@ fn distance(left: &Contour, right: &Contour, memory: &mut Vec<f32>) -> Option<f3
     memory.clear();
     let both = left.at.iter().zip(&right.at);
     memory.extend(both.filter_map(|(left, right)| Some((*right)? - (*left)?)));
-    if memory.len() * 5 < left.at.len() || memory.is_empty() {
+    if memory.len() * 5 < left.at.len() {
         return None;
     }
-    let middle = memory.len() / 2;
-    let median = *memory.select_nth_unstable_by(middle, f32::total_cmp).1;
-    (median > 0.0).then_some(median)
+    rank::median(memory).filter(|&median| median > 0.0)
 }
 
 /// Depth of the deepest gap between two edges: a contour out of the bead,

@@ -1,8 +1,10 @@
 //! Rough places and levels, one a band, made into smooth ones that every row
 //! can be held against.
 
+use super::number::{narrow, single};
 use super::overlay::Path;
 use super::pool::{Bands, middle};
+use super::rank;
 
 /// Bands on either side that a smoothed value is taken from.
 const NEIGHBOURS: usize = 3;
@@ -64,7 +66,7 @@ pub fn take_out_wild(values: &mut [f32], memory: &mut Vec<f32>) {
     for off in &mut memory[offs..] {
         *off = off.abs();
     }
-    let typical = *memory[offs..].select_nth_unstable_by(offs / 2, f32::total_cmp).1;
+    let Some(typical) = rank::median(&mut memory[offs..]) else { return };
     for (value, off) in values.iter_mut().zip(&memory[..offs]) {
         if off.abs() > WILD_PX + WILD_TIMES * typical {
             *value = f32::NAN;
@@ -169,7 +171,7 @@ impl Course {
 
     fn measure_pitch(&mut self) {
         let last = self.middles.len() - 1;
-        self.per_px = float(last) / (self.middles[last] - self.middles[0]).max(1.0);
+        self.per_px = single(last) / (self.middles[last] - self.middles[0]).max(1.0);
     }
 
     /// Place, level before and step at a row, or between two. Beyond the first
@@ -212,16 +214,6 @@ impl Path for Course {
     fn expected(&self, v: f32) -> [f32; 3] {
         self.at(v)
     }
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "pixel coordinates are small")]
-fn narrow(value: f64) -> f32 {
-    value as f32
-}
-
-#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-fn float(number: usize) -> f32 {
-    number as f32
 }
 
 #[expect(

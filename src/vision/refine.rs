@@ -6,6 +6,7 @@
 use super::blur::Overlay;
 use super::fit::{Edge, EdgeFit, Prior, Window};
 use super::pool;
+use super::rank;
 use super::step::StepTable;
 use super::strip::{Grey, Strip};
 use super::trace::Located;
@@ -245,13 +246,8 @@ impl Refiner {
                 n += 1.0;
             }
         }
-        let middle = scatter.len() / 2;
         // 0.455 is the median of the square of a standard normal number.
-        let total = if scatter.is_empty() {
-            0.0
-        } else {
-            *scatter.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.455
-        };
+        let total = rank::median(&mut scatter).unwrap_or(0.0) / 0.455;
         self.scatter = scatter;
         (total - explained / f64::max(n, 1.0)).max(0.0)
     }

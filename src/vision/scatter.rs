@@ -1,6 +1,8 @@
 //! How far the places of an edge scatter about its course, and over how many
 //! bands that hangs together.
 
+use super::number::float;
+
 /// Weights of a parabola through nine neighbours at the middle one, over 231.
 const SMOOTHER: [f64; 9] = [-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0];
 const HALF: usize = 4;
@@ -107,11 +109,6 @@ pub fn correlated_variance(values: &[f64]) -> f64 {
         time += 2.0 * product / square;
     }
     square / (float(values.len()) - 3.0).max(1.0) * time
-}
-
-#[expect(clippy::cast_precision_loss, reason = "there are few bands")]
-fn float(number: usize) -> f64 {
-    number as f64
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The gauge straightened along an edge: the pixels around it, one window a few
 //! rows, read once and held against the edge as often as it takes.
 
+use super::number::single;
 use super::strip::{Grey, Strip};
 
 /// Pixels of a window.
@@ -63,9 +64,9 @@ impl Sheet {
             let mut v = from;
             while v < to {
                 let rows = together.min(to - v);
-                let middle = float(2 * v + rows - 1) / 2.0;
+                let middle = single(2 * v + rows - 1) / 2.0;
                 let first = floor(at(middle)) - MIDDLE.cast_signed();
-                self.windows.push(Window { line, rows: float(rows), middle, first });
+                self.windows.push(Window { line, rows: single(rows), middle, first });
                 v += rows;
             }
         }
@@ -96,7 +97,7 @@ fn average<T: Grey>(
     first: isize,
     out: &mut [f32; SPAN],
 ) {
-    let scale = strip.scale / float(rows.len());
+    let scale = strip.scale / single(rows.len());
     let mut sums = [T::Sum::default(); SPAN];
     let mut v = rows.start;
     let mut memory = [[T::default(); SPAN]; 2];
@@ -137,11 +138,6 @@ fn add<T: Grey, const N: usize>(rows: [&[T; SPAN]; N], sums: &mut [T::Sum; SPAN]
             sums[k] = row[k].add_to(sums[k]);
         }
     }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-fn float(number: usize) -> f32 {
-    number as f32
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "a place near the gauge")]

@@ -3,6 +3,7 @@
 
 use nalgebra::Matrix3;
 
+use super::number::float;
 use super::overlay::Shape;
 use super::phase::{offset, split};
 use super::step::StepTable;
@@ -414,9 +415,4 @@ impl Products {
 )]
 fn chunks(pixels: f64) -> usize {
     (pixels.max(0.0) / float(LANES)).ceil() as usize
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a window is short")]
-fn float(number: usize) -> f64 {
-    number as f64
 }

@@ -4,6 +4,7 @@
 
 use std::sync::LazyLock;
 
+use super::number::float;
 use super::overlay::Overlay;
 
 /// Variance of the rows about an edge, in that of their noise, from which on
@@ -314,11 +315,6 @@ fn mean_of_pairs(by_distance: &[f64]) -> f64 {
 /// The lengths that are tried \[px\].
 fn length(number: usize) -> f64 {
     FIRST_LENGTH_PX * LENGTH_RATIO.powf(float(number))
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a small number")]
-fn float(number: usize) -> f64 {
-    number as f64
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ mod rows;
 mod uncover;
 
 use super::cut_off::CutOff;
+use super::number::{float, narrow};
 use super::overlay::{Extent, Look, Overlay, REACH, Shape, Step};
 use super::path::{self, Course};
 use super::pool::{self, Bands};
@@ -402,14 +403,4 @@ fn typical(values: &[f32]) -> f32 {
     #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
     let count = values.len().max(1) as f32;
     sum / count
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "the quantity needs no more")]
-fn narrow(value: f64) -> f32 {
-    value as f32
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a count")]
-fn float(number: usize) -> f64 {
-    number as f64
 }

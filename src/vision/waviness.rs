@@ -9,6 +9,7 @@
 use std::sync::LazyLock;
 
 use super::curve::Curve;
+use super::number::float;
 
 /// Legendre coefficients that are looked at: of the orders 1 to 8.
 pub const ORDERS: usize = 8;
@@ -184,11 +185,6 @@ pub fn legendre(t: f64) -> [f64; ORDERS] {
         *value = here;
     }
     values
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a small number")]
-fn float(number: usize) -> f64 {
-    number as f64
 }
 
 #[cfg(test)]

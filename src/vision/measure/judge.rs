@@ -3,6 +3,7 @@
 
 use super::Work;
 use crate::vision::outlier;
+use crate::vision::rank;
 use crate::vision::reject::Reject;
 use crate::vision::trace::Tracer;
 use crate::vision::width::WidthMeasurement;
@@ -71,11 +72,7 @@ impl Work {
         let side = if left { &self.left } else { &self.right };
         self.scatter.clear();
         self.scatter.extend(side.edges().iter().flatten().map(|edge| edge.height.abs()));
-        let middle = self.scatter.len() / 2;
-        if self.scatter.is_empty() {
-            return 0.0;
-        }
-        *self.scatter.select_nth_unstable_by(middle, f64::total_cmp).1
+        rank::median(&mut self.scatter).unwrap_or(0.0)
     }
 
     /// Refuses a bead of whose edges too little is uncovered to tell where they

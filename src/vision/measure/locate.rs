@@ -6,6 +6,7 @@ use super::search::Found;
 use super::{NEED_SHARE, OFF_PX, Work};
 use crate::vision::covered;
 use crate::vision::noise;
+use crate::vision::rank;
 use crate::vision::reject::Reject;
 use crate::vision::saturated;
 use crate::vision::strip::{Grey, Strip};
@@ -116,8 +117,5 @@ fn narrowest(left: &[Option<f32>], right: &[Option<f32>], memory: &mut Vec<f32>)
     memory.clear();
     memory.extend(left.iter().zip(right).filter_map(|(left, right)| Some((*right)? - (*left)?)));
     let rank = memory.len() / 10;
-    if memory.is_empty() {
-        return 0.0;
-    }
-    *memory.select_nth_unstable_by(rank, f32::total_cmp).1
+    rank::at(memory, rank).unwrap_or(0.0)
 }

@@ -2,6 +2,7 @@
 //! weighted so that the texture disturbs it least.
 
 use super::{LANES, MAX_CHUNKS, PHASES, Template};
+use crate::vision::number::float;
 use crate::vision::texture::Texture;
 use crate::vision::whiten::{MOST, Whitener};
 
@@ -79,9 +80,4 @@ fn of_window(weights: &[f64], texture: &Texture) -> f64 {
         sum += product * if distance == 0 { covariance + noise } else { 2.0 * covariance };
     }
     sum
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a small number")]
-fn float(number: usize) -> f64 {
-    number as f64
 }

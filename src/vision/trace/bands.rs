@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::rows::Group;
 use super::{Located, NEAR_ENOUGH, Scene, Tracer, float, narrow};
 use crate::vision::pool;
+use crate::vision::rank;
 use crate::vision::strip::Grey;
 
 /// Share of the plain pixels that must be as they are expected for their level
@@ -91,9 +92,8 @@ impl Tracer {
             return 0.0;
         }
         let bands = float(self.scatter.len());
-        let middle = self.scatter.len() / 2;
         // 0.455 is the median of the square of a standard normal number.
-        let ratio = *self.scatter.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.455;
+        let ratio = rank::median(&mut self.scatter).unwrap_or(0.0) / 0.455;
         let doubt = 2.3 / bands.sqrt();
         if ratio < 1.0 + BELIEVED * doubt { 0.0 } else { (ratio - 1.0) * explained / bands }
     }

@@ -2,6 +2,7 @@
 
 use super::{Scene, Tracer};
 use crate::vision::path;
+use crate::vision::rank;
 use crate::vision::strip::Grey;
 
 /// Where levels are picked first: distance from the edge, and apart \[px\].
@@ -45,8 +46,7 @@ impl Tracer {
     pub(super) fn steady_steps(&mut self) {
         self.sorted.clear();
         self.sorted.extend_from_slice(&self.step);
-        let middle = self.sorted.len() / 2;
-        let typical = *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let Some(typical) = rank::median(&mut self.sorted) else { return };
         let typical = if typical.abs() < 1.0 { 1.0f32.copysign(typical) } else { typical };
         for step in &mut self.step {
             if *step / typical < 0.3 {

@@ -6,6 +6,7 @@ use nalgebra::Matrix3;
 use super::bands::BandSums;
 use super::{MANY_SIGMA, Scene, Tracer, float, narrow};
 use crate::vision::pool;
+use crate::vision::rank;
 use crate::vision::strip::Grey;
 use crate::vision::template::{Expected, PlainSums, RowSums, Template};
 
@@ -103,11 +104,7 @@ impl Tracer {
             // What is hidden says nothing.
             self.sorted.retain(|misfit| misfit.is_finite());
         }
-        if self.sorted.is_empty() {
-            self.sorted.push(f32::INFINITY);
-        }
-        let middle = self.sorted.len() / 2;
-        let median = *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let median = rank::median(&mut self.sorted).unwrap_or(f32::INFINITY);
         let pixels = narrow(products.pixels);
         let together = self.groups.iter().fold(1.0, |most: f32, group| most.max(group.weight));
         let variance = together * self.pixel_variance(scene, together);

@@ -3,9 +3,11 @@
 
 use super::{CLEAR_FIT, MANY_SIGMA, State, Tracer, narrow, typical};
 use crate::vision::agree::agree;
+use crate::vision::number::single;
 use crate::vision::overlay::{Extent, Shape};
 use crate::vision::path;
 use crate::vision::pool;
+use crate::vision::rank;
 use crate::vision::step::StepTable;
 use crate::vision::strip::Grey;
 use crate::vision::template::{PlainSums, Template};
@@ -130,13 +132,10 @@ impl Tracer {
         self.rough.extend(places.map(|edge| edge.map_or(f32::NAN, |edge| narrow(edge.at))));
         self.sorted.clear();
         self.sorted.extend(self.edges.iter().flatten().map(|edge| narrow(edge.variance.sqrt())));
-        if self.sorted.is_empty() {
-            return;
-        }
         let count = self.sorted.len();
-        let sigma = *self.sorted.select_nth_unstable_by(count / 2, f32::total_cmp).1;
+        let Some(sigma) = rank::median(&mut self.sorted) else { return };
         let left = agree(&mut self.rough, narrow(least_px).max(MANY_SIGMA * sigma));
-        if float(count - left) > MOST_STRAYS * float(count) {
+        if single(count - left) > MOST_STRAYS * single(count) {
             return;
         }
         for (edge, at) in self.edges.iter_mut().zip(&self.rough) {
@@ -261,7 +260,7 @@ impl Tracer {
         let limit = self.limit_of_rows(scene.noise);
         let far = self.far_of_rows(scene, limit);
         let weight = self.groups.first().map_or(1.0, |group| group.weight);
-        let rows = float(scene.strip.along);
+        let rows = single(scene.strip.along);
         for blurs in BESIDE_BLURS {
             #[expect(
                 clippy::cast_possible_truncation,
@@ -290,7 +289,7 @@ impl Tracer {
         self.sorted.clear();
         self.sorted.extend(self.groups.iter().map(|group| group.misfit));
         let rank = self.sorted.len() * SURELY_CLEAR / 100;
-        let sure = *self.sorted.select_nth_unstable_by(rank, f32::total_cmp).1;
+        let sure = rank::at(&mut self.sorted, rank).unwrap_or(f32::INFINITY);
         let pixels = narrow(self.template.products.pixels);
         let noise = noise * noise * (pixels + MANY_SIGMA * (2.0 * pixels).sqrt());
         noise.max(f32::min(UNLIKE * sure, MOST_UNLIKE * noise))
@@ -305,17 +304,13 @@ impl Tracer {
         self.sorted.clear();
         let likely = self.groups.iter().filter(|group| group.misfit <= limit);
         self.sorted.extend(likely.map(|group| group.moved.abs()));
-        if self.sorted.is_empty() {
-            return FAR_SIGMA * noise;
-        }
-        let middle = self.sorted.len() / 2;
-        let median = *self.sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let median = rank::median(&mut self.sorted).unwrap_or(0.0);
         FAR_SIGMA * noise.max(1.48 * median)
     }
 
     fn clear_share(&self) -> f32 {
         let clear = self.clear.iter().filter(|clear| **clear).count();
-        float(clear) / float(self.clear.len().max(1))
+        single(clear) / single(self.clear.len().max(1))
     }
 
     /// Longest run of rows that do not fit, but show the same edge where their
@@ -365,9 +360,4 @@ impl Tracer {
         }
         self.course.redraw(scene.lines, &self.rough, &mut self.memory);
     }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-fn float(number: usize) -> f32 {
-    number as f32
 }

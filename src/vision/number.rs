@@ -1,0 +1,20 @@
+//! Numbers as numbers of another kind, where nothing that counts is lost: places
+//! and counts are small, and a quantity of seven digits is enough for a pixel.
+
+/// A count or a whole place as a number.
+#[expect(clippy::cast_precision_loss, reason = "counts and places are small")]
+pub fn float(number: usize) -> f64 {
+    number as f64
+}
+
+/// The same in single precision.
+#[expect(clippy::cast_precision_loss, reason = "counts and places are small")]
+pub fn single(number: usize) -> f32 {
+    number as f32
+}
+
+/// A quantity in single precision.
+#[expect(clippy::cast_possible_truncation, reason = "the quantity needs no more")]
+pub fn narrow(value: f64) -> f32 {
+    value as f32
+}

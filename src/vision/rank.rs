@@ -1,0 +1,50 @@
+//! Medians and other ranks of values in scratch memory, which is left in another
+//! order.
+
+use std::cmp::Ordering;
+
+/// Numbers that have an order.
+pub trait Ordered: Copy {
+    /// The total order of IEEE 754.
+    fn order(&self, other: &Self) -> Ordering;
+}
+
+impl Ordered for f32 {
+    fn order(&self, other: &Self) -> Ordering {
+        self.total_cmp(other)
+    }
+}
+
+impl Ordered for f64 {
+    fn order(&self, other: &Self) -> Ordering {
+        self.total_cmp(other)
+    }
+}
+
+/// The value that so many others do not exceed; `None` where there are no more
+/// than that.
+#[inline(always)]
+pub fn at<T: Ordered>(values: &mut [T], rank: usize) -> Option<T> {
+    (rank < values.len()).then(|| *values.select_nth_unstable_by(rank, T::order).1)
+}
+
+/// The middle one, of two the upper; `None` of none.
+#[inline(always)]
+pub fn median<T: Ordered>(values: &mut [T]) -> Option<T> {
+    let middle = values.len() / 2;
+    at(values, middle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranks_are_those_of_the_sorted_values() {
+        let mut values = [5.0, -1.0, 3.0, 9.0];
+        assert_eq!(at(&mut values, 0), Some(-1.0));
+        assert_eq!(median(&mut values), Some(5.0));
+        assert_eq!(median(&mut values[..0]), None);
+        assert_eq!(at(&mut [1.0f32], 1), None);
+    }
+}
