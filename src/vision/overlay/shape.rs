@@ -14,9 +14,9 @@ pub const MAX_STEPS: usize = 16;
 /// A step \[px, or blurs\] after which another would change next to nothing: each
 /// squares what is left.
 const CONVERGED: f64 = 2e-3;
-/// Slope that shows another step beside the edge, times the blur: a tenth of
+/// Slope that shows another step beside the edge, times the blur: a twelfth of
 /// what the edge itself has.
-const NOTABLE: f64 = 0.04;
+const NOTABLE: f64 = 0.032;
 /// Shading that is usual close to an edge, as a standard deviation \[1/px\].
 pub const SHADING_SD: f64 = 0.02;
 
