@@ -83,17 +83,18 @@ impl Covariance {
     /// because a gauge stays in its place, and with it the error. `None` where
     /// no such bead is seen on the surface.
     pub fn width_sigma_share(&self) -> Option<f64> {
-        self.largest_share(self.seen_px)
+        self.shares(self.seen_px).flatten().reduce(f64::max)
     }
 
     /// The same with beads of a third of the picture, anywhere in it, too. Where
     /// no corner held the distortion it is carried on, and a width may be known
-    /// many times worse.
+    /// many times worse. `None` where some of the beads are seen nowhere on the
+    /// surface.
     pub fn width_sigma_share_anywhere(&self) -> Option<f64> {
         let [right, bottom] = self.image_size_px.map(|px| f64::from(px) - 1.0);
         let all = [ImagePoint::origin(), ImagePoint::new(right, bottom)];
-        let shares = [self.seen_px, all].map(|part| self.largest_share(part));
-        shares.into_iter().flatten().reduce(f64::max)
+        let [seen, all] = [self.seen_px, all].map(|part| self.shares(part));
+        seen.chain(all).try_fold(0.0, |most: f64, share| Some(most.max(share?)))
     }
 
     /// First and last column and row between which boards were seen \[px\].
@@ -101,15 +102,18 @@ impl Covariance {
         self.seen_px
     }
 
-    fn largest_share(&self, part: [ImagePoint; 2]) -> Option<f64> {
+    /// Shares of beads all over a part of the picture; `None` for one that is not
+    /// seen on the surface.
+    fn shares(&self, part: [ImagePoint; 2]) -> impl Iterator<Item = Option<f64>> {
         let eye = bed_from_board(&self.board, self.thickness).apply_inverse(Point3::origin());
-        let heights = [Mm::ZERO, Mm::new(SURFACE * eye.z).ok()?];
-        let beads = heights.iter().flat_map(|&height| beads(part).map(move |ends| (height, ends)));
-        let shares = beads.filter_map(|(height, ends)| {
+        let above = Mm::new(SURFACE * eye.z).unwrap_or(Mm::ZERO);
+        let beads = [Mm::ZERO, above]
+            .into_iter()
+            .flat_map(move |height| beads(part).map(move |ends| (height, ends)));
+        beads.map(|(height, ends)| {
             let (width_mm, sigma_mm) = self.width_mm(ends, height)?;
-            Some(sigma_mm / width_mm)
-        });
-        shares.filter(|share| share.is_finite()).reduce(f64::max)
+            Some(sigma_mm / width_mm).filter(|share| share.is_finite())
+        })
     }
 
     /// Distance of two points of a surface, seen at these pixels, and its

@@ -60,7 +60,11 @@ impl Calibration {
                 Kind::Plane { camera: *camera, bed: *bed, height_mm }
             }
         };
-        SurfaceMap { kind, width_sigma_share: self.width_sigma_share() }
+        SurfaceMap {
+            kind,
+            width_sigma_share: self.width_sigma_share(),
+            image_size_px: self.image_size_px(),
+        }
     }
 
     fn width_sigma_share(&self) -> Option<f64> {
@@ -84,6 +88,7 @@ impl Calibration {
 pub struct SurfaceMap {
     kind: Kind,
     width_sigma_share: Option<f64>,
+    image_size_px: Option<[u32; 2]>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,7 +100,13 @@ enum Kind {
 impl SurfaceMap {
     /// A surface on which every pixel has the same size.
     pub fn from_scale(mm_per_px: f64) -> Self {
-        Self { kind: Kind::Scale(mm_per_px), width_sigma_share: None }
+        Self { kind: Kind::Scale(mm_per_px), width_sigma_share: None, image_size_px: None }
+    }
+
+    /// Size of the images that it is meant for \[px\]; `None` if it does not
+    /// matter.
+    pub fn image_size_px(&self) -> Option<[u32; 2]> {
+        self.image_size_px
     }
 
     /// Relative standard deviation that the calibration behind the map leaves

@@ -109,6 +109,12 @@ pub fn doubts(solution: &Solution) -> Vec<Doubt> {
     doubts
 }
 
+/// Whether the pictures tell the camera's numbers apart at all.
+pub fn settles_camera(solution: &Solution) -> bool {
+    let loose = |doubt: &Doubt| matches!(doubt, Doubt::LooseFocal { .. } | Doubt::NoTilt { .. });
+    !doubts(solution).iter().any(loose)
+}
+
 fn outliers(views: &[View]) -> impl Iterator<Item = Doubt> {
     let mut errors: Vec<f64> = views.iter().map(|view| view.rms_px).collect();
     errors.sort_by(f64::total_cmp);

@@ -13,6 +13,10 @@ pub struct SingleScale {
     /// Millimetres a pixel in the middle of the picture, mean of all
     /// directions.
     pub mm_per_px: f64,
+    /// Half the difference between the largest and the smallest size of that
+    /// pixel: so wrong is the number for a bead that runs along one of them
+    /// \[mm/px\].
+    pub uneven: f64,
     /// The smallest anywhere in the picture, in any direction \[mm/px\].
     pub smallest: f64,
     /// The largest anywhere in the picture, in any direction \[mm/px\].
@@ -36,7 +40,9 @@ pub fn single_scale(calibration: &Calibration, surface_height: Mm) -> Option<Sin
         .map(|i| (f64::from(i % GRID) / steps, f64::from(i / GRID) / steps))
         .filter_map(|(x, y)| sizes(Point2::new(x * width, y * height)))
         .fold((mm_per_px, mm_per_px), |(low, high), s| (low.min(s.min()), high.max(s.max())));
-    Some(SingleScale { mm_per_px, smallest, largest })
+    let middle = sizes(Point2::new(width / 2.0, height / 2.0))?;
+    let uneven = 0.5 * (middle.max() - middle.min());
+    Some(SingleScale { mm_per_px, uneven, smallest, largest })
 }
 
 /// Millimetres a pixel in the middle of a picture of this size, mean of all

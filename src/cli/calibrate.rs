@@ -15,6 +15,7 @@ use crate::bridge::{self, BoardView};
 use crate::calib::board::Board;
 use crate::calib::covariance::Covariance;
 use crate::calib::plane::bed_from_board;
+use crate::calib::quality;
 use crate::calib::solve::{self, Refusal, Sighting, Solution};
 use crate::calib::{Calibration, Quality, file};
 use crate::frame::Channel;
@@ -102,7 +103,10 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     let solution = solve::solve(&board, &seen).inspect_err(|_| say(&report::refusals(&looks)))?;
     say(&report::images(&looks, &solution));
     let plane = find_plane(args, &board, &solution, &looks)?;
-    let covariance = Covariance::of(&board, &solution, &plane.board, plane.thickness);
+    // Corners' noise is the least of the errors where the focal length is loose.
+    let covariance = quality::settles_camera(&solution)
+        .then(|| Covariance::of(&board, &solution, &plane.board, plane.thickness))
+        .flatten();
     let quality = Quality {
         reprojection_rms_px: solution.rms_px,
         width_sigma_share: covariance.as_ref().and_then(Covariance::width_sigma_share),

@@ -11,6 +11,9 @@ use super::trace::{Scene, Tracer};
 /// edges \[px\].
 const ABOUT_PX: f32 = 40.0;
 
+/// Least distance of two steps, as a share of that of the rough edges.
+const LEAST_SHARE: f32 = 0.3;
+
 /// A bead that was looked at.
 #[derive(Debug, Clone, Copy)]
 pub struct Bead<'a, T> {
@@ -35,7 +38,7 @@ impl<T: Grey> Bead<'_, T> {
     ) {
         let [left_scene, right_scene] = &self.scenes;
         let width = left_scene.width_px;
-        let range = width - ABOUT_PX..width + ABOUT_PX;
+        let range = f32::max(width - ABOUT_PX, LEAST_SHARE * width)..width + ABOUT_PX;
         let bands = self.candidates.len();
         let lefts = |band| self.places(band, left, left_scene, self.bright);
         let rights = |band| self.places(band, right, right_scene, !self.bright);

@@ -152,6 +152,7 @@ impl Measurer {
         if !self.gauge.roi.fits(frame.size()) {
             return Err(Reject::WrongSize { image: frame.size() });
         }
+        check_size(frame.size(), surface)?;
         if self.gauge.method == Method::EdgeLines {
             let points = (&mut work.left_px, &mut work.right_px);
             return edge_lines::measure(&self.gauge, frame, surface, points);
@@ -160,6 +161,13 @@ impl Measurer {
         let strips = self.turner.strips(frame, &view, self.white);
         pulp::Arch::new().dispatch(Task { work, strips, view: &view, surface })
     }
+}
+
+/// Refuses images of another size than those that the calibration was made with.
+fn check_size(image: (usize, usize), surface: &SurfaceMap) -> Result<(), Reject> {
+    let Some(calibrated) = surface.image_size_px() else { return Ok(()) };
+    let same = [image.0, image.1].map(u32::try_from) == calibrated.map(Ok);
+    if same { Ok(()) } else { Err(Reject::OtherSize { image, calibrated }) }
 }
 
 /// A measurement as the processor's vectors do it: the same code is compiled
@@ -200,6 +208,7 @@ impl Work {
         self.trace(strip, pair)?;
         self.sort_out()?;
         self.check_contrast()?;
+        self.check_border(strip.across)?;
         self.width_on(view, surface)
     }
 

@@ -32,7 +32,8 @@ const UNLIKE: [f32; 2] = [2.0, 1.7];
 /// may be covered, and how often anew.
 const ALIKE: f32 = 0.3;
 const SETTLES: usize = 5;
-/// The same for rows that are cut off at the end of the scale.
+/// What makes a row that is cut off at the end of the scale unlike the others, in
+/// such medians.
 const VERY_UNLIKE: f32 = 3.5;
 /// Blur that the place's rounding to half a pixel adds \[px²\].
 const ROUNDING: f64 = 1.0 / 48.0;

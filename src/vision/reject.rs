@@ -57,12 +57,31 @@ pub enum Reject {
         /// Smallest radius that is measured, in widths.
         least_widths: f64,
     },
-    /// The bead touches the border of the gauge.
-    Clipped,
+    /// The bead's edges are known too badly: too much of them is covered.
+    Unsure {
+        /// Standard deviation of the width \[px\].
+        got_px: f64,
+        /// Largest that is believed \[px\].
+        limit_px: f64,
+    },
+    /// An edge lies so near the border of the gauge that it is cut short.
+    Clipped {
+        /// Distance of the edge from the border \[px\].
+        got_px: f64,
+        /// Distance that is needed \[px\].
+        need_px: f64,
+    },
     /// The gauge does not lie within the image.
     WrongSize {
         /// Size of the image \[px\].
         image: (usize, usize),
+    },
+    /// The calibration was made with images of another size.
+    OtherSize {
+        /// Size of the image \[px\].
+        image: (usize, usize),
+        /// Size of the images of the calibration \[px\].
+        calibrated: [u32; 2],
     },
     /// The calibration has no point on the surface for an edge.
     OffSurface,
@@ -80,8 +99,9 @@ impl Reject {
             Self::WidthOutOfRange { .. } => "width_out_of_range",
             Self::Crooked { .. } => "crooked",
             Self::Corner { .. } => "corner",
-            Self::Clipped => "clipped",
-            Self::WrongSize { .. } => "wrong_size",
+            Self::Unsure { .. } => "unsure",
+            Self::Clipped { .. } => "clipped",
+            Self::WrongSize { .. } | Self::OtherSize { .. } => "wrong_size",
             Self::OffSurface => "off_surface",
             Self::Unreadable => "unreadable",
         }
@@ -125,10 +145,21 @@ impl fmt::Display for Reject {
                 f,
                 "the bead bends with a radius of {got_widths:.1} widths, measured are {least_widths:.1} or more"
             ),
-            Self::Clipped => f.write_str("the bead touches the border of the gauge"),
+            Self::Unsure { got_px, limit_px } => write!(
+                f,
+                "so much of the edges is covered that the width is unsure by {got_px:.2} px, {limit_px:.2} are bearable"
+            ),
+            Self::Clipped { got_px, need_px } => write!(
+                f,
+                "an edge lies {got_px:.1} px from the border of the gauge, {need_px:.1} are needed"
+            ),
             Self::WrongSize { image: (width, height) } => {
                 write!(f, "the gauge does not fit an image of {width}x{height} px")
             }
+            Self::OtherSize { image: (width, height), calibrated: [across, down] } => write!(
+                f,
+                "the image has {width}x{height} px, the calibration was made with {across}x{down}"
+            ),
             Self::OffSurface => f.write_str("an edge has no point on the surface"),
             Self::Unreadable => f.write_str("the frame could not be read"),
         }

@@ -147,7 +147,7 @@ impl Tracer {
         used / float(self.edges.len().max(1))
     }
 
-    /// The same, for those who sort out outliers.
+    /// The edges, for those who sort out outliers.
     pub fn edges_mut(&mut self) -> &mut [Option<Located>] {
         &mut self.edges
     }

@@ -116,8 +116,12 @@ pub fn width(calibration: &Calibration, covariance: Option<&Covariance>) -> Stri
     let mut out = String::new();
     let shares = covariance.map(|c| (c, c.width_sigma_share(), c.width_sigma_share_anywhere()));
     let Some((covariance, Some(share), anywhere)) = shares else {
-        line!(out, "\nhow well a width on the bed is known cannot be told: the pictures do not");
-        line!(out, "  tell the camera's numbers apart");
+        line!(
+            out,
+            "\nhow well a width on the bed is known cannot be told, and is not in the file: the"
+        );
+        line!(out, "  pictures do not tell the camera's numbers apart; tilt the board by 20 to 45");
+        line!(out, "  degrees to several sides");
         return out;
     };
     let example = example(calibration, share);
@@ -134,6 +138,8 @@ pub fn width(calibration: &Calibration, covariance: Option<&Covariance>) -> Stri
     );
     if let Some(anywhere) = anywhere {
         line!(out, "  in all of the picture it is {:.3} % or better", 100.0 * anywhere);
+    } else {
+        line!(out, "  elsewhere it cannot be told: not all of the picture sees the bed");
     }
     out
 }
@@ -183,7 +189,14 @@ pub fn scale(calibration: &Calibration, covariance: Option<&Covariance>, face: M
     );
     line!(out, "  file = … in the [calibration] of a cell file");
     if let Some(sigma) = sigma {
-        line!(out, "  and, for a bead in the middle, mm_per_px_sigma = {sigma:.6} beside it");
+        line!(out, "  and, for a bead in the middle, mm_per_px_sigma = {:.6} beside it:", {
+            sigma.hypot(scale.uneven)
+        });
+        line!(
+            out,
+            "  the pixel there is {:.6} mm longer one way than the other",
+            2.0 * scale.uneven
+        );
     }
     out
 }

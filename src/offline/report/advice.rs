@@ -28,12 +28,18 @@ pub fn on(status: &str) -> (&'static str, &'static str) {
             "Turn the camera or the gauge with the bead; in sharp curves this is to be expected.",
         ),
         "clipped" => (
-            "The bead touches the border of the gauge.",
+            "An edge lies so near the border of the gauge that it is cut short.",
             "Make roi_px larger across the bead, or bring the bead back to its middle.",
         ),
+        "unsure" => (
+            "So much of an edge is covered, by grains or spots, that the rest does not tell its course.",
+            "Clear the bed of grains, shade what glitters, or make the gauge longer.",
+        ),
         "wrong_size" => (
-            "The gauge does not lie within the image.",
-            "Check roi_px against the size of the images, and the camera's resolution.",
+            "The gauge does not lie within the image, or the calibration was made with images of \
+             another size.",
+            "Check the camera's resolution, and roi_px and the calibration's image_size_px against \
+             the size of the images.",
         ),
         "off_surface" => (
             "By the calibration an edge does not lie on the measured surface.",
@@ -67,8 +73,10 @@ mod tests {
             Reject::WidthOutOfRange { got_mm: 1.0, min_mm: 2.0, max_mm: 3.0 },
             Reject::Crooked { got_rad: 1.0, limit_rad: 0.3 },
             Reject::Corner { got_widths: 0.5, least_widths: 1.5 },
-            Reject::Clipped,
+            Reject::Unsure { got_px: 0.4, limit_px: 0.2 },
+            Reject::Clipped { got_px: 1.0, need_px: 3.0 },
             Reject::WrongSize { image: (1, 1) },
+            Reject::OtherSize { image: (1, 1), calibrated: [2, 2] },
             Reject::OffSurface,
             Reject::Unreadable,
         ] {

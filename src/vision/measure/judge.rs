@@ -2,6 +2,7 @@
 //! and steps that are too low.
 
 use super::Work;
+use crate::vision::number::float;
 use crate::vision::outlier;
 use crate::vision::rank;
 use crate::vision::reject::Reject;
@@ -22,6 +23,12 @@ const VERY_STRANGE: f64 = 8.0;
 const COVERED_SIGMA_PX: f64 = 0.19;
 /// Share of clear rows from which on an edge's course is sure enough.
 const PLENTY_CLEAR: f64 = 0.6;
+/// Distance from the border of the gauge that an edge needs, in its blurs and at
+/// least \[px\]: a step that is cut short there seems to lie farther inside.
+const BORDER_BLURS: f64 = 3.0;
+const BORDER_PX: f64 = 3.0;
+/// Share of an edge's places that may be nearer.
+const NEARER: f64 = 0.05;
 /// Largest scatter of neighbouring edges about each other \[px\] that still is
 /// an edge, not noise.
 const MAX_SCATTER_PX: f64 = 1.5;
@@ -50,9 +57,12 @@ impl Work {
         let enough =
             [&self.left, &self.right].iter().all(|side| side.used_share() >= need_of(side));
         let limit = if self.is_lost { LOST_SCATTER_PX } else { MAX_SCATTER_PX };
-        if !enough || worst > limit {
-            let got = if worst > limit { 0.0 } else { got };
-            return Err(Reject::NoPair { got, need: NEED_ROWS });
+        if worst > limit {
+            return Err(Reject::Unsure { got_px: worst, limit_px: limit });
+        }
+        if !enough {
+            let need = f64::max(need_of(&self.left), need_of(&self.right));
+            return Err(Reject::NoPair { got, need });
         }
         Ok(())
     }
@@ -78,12 +88,33 @@ impl Work {
     /// Refuses a bead of whose edges too little is uncovered to tell where they
     /// run.
     pub(super) fn check_covered(&self, found: &WidthMeasurement) -> Result<(), Reject> {
-        let share = found.sigma.get() / found.width.get();
+        let got_px = found.sigma.get() / found.width.get() * f64::from(self.width_px);
         let sparse = |side: &Tracer| side.is_covered() && side.used_share() < PLENTY_CLEAR;
         let unsure = sparse(&self.left) || sparse(&self.right);
-        if unsure && share * f64::from(self.width_px) > COVERED_SIGMA_PX {
-            let got = self.left.used_share().min(self.right.used_share());
-            return Err(Reject::NoPair { got, need: NEED_ROWS });
+        if unsure && got_px > COVERED_SIGMA_PX {
+            return Err(Reject::Unsure { got_px, limit_px: COVERED_SIGMA_PX });
+        }
+        Ok(())
+    }
+
+    /// Refuses a bead whose edges the border of the gauge cuts short.
+    pub(super) fn check_border(&self, across: usize) -> Result<(), Reject> {
+        let last = float(across.saturating_sub(1));
+        for side in [&self.left, &self.right] {
+            let need_px = f64::max(BORDER_PX, BORDER_BLURS * side.blur_px);
+            let places = side.edges().iter().flatten();
+            let distances = places.map(|edge| edge.at.min(last - edge.at));
+            let (mut near, mut all, mut got_px) = (0.0, 0.0, f64::INFINITY);
+            for distance in distances {
+                all += 1.0;
+                if distance < need_px {
+                    near += 1.0;
+                    got_px = got_px.min(distance.max(0.0));
+                }
+            }
+            if near > NEARER * all {
+                return Err(Reject::Clipped { got_px, need_px });
+            }
         }
         Ok(())
     }

@@ -124,7 +124,8 @@ impl Overlay {
         let Extent { before: from, after: to } = reach(look);
         let height = edge.after - edge.before;
         let mut normal = Normal::default();
-        let (mut square, mut n) = (0.0, -9.0);
+        let many = 3.0 * flanks.0.iter().flatten().map(|_| 1.0).sum::<f64>();
+        let (mut square, mut n) = (0.0, -6.0 - many);
         for (at, value, weight) in self.samples(-from, to) {
             let z = (at - edge.at) / edge.blur;
             let (step, density) = table.at(z);

@@ -61,7 +61,7 @@ fn a_plain_edge_is_plain_as_far_as_can_be_seen() {
     assert!(shape.extent.before > 40.0 && shape.extent.after > 40.0);
 }
 
-/// The shadow's flank, 6 px before the edge, leads the way to a level of 14.
+/// The shadow's flank, 6 or 8 px before the edge, leads the way to a level of 14.
 #[test]
 fn a_shadow_close_by_does_not_move_the_edge() {
     let table = StepTable::default();

@@ -100,7 +100,7 @@ impl Tracer {
         self.scatter_in_texture = None;
     }
 
-    /// The same where the bead's other edge shows how this one runs: where most
+    /// Locates an edge from its clear rows where the bead's other edge shows how this one runs: where most
     /// of it is covered, what covers it may agree better than what is left.
     /// `places` are those that run beside the other edge, one a band, NaN in
     /// bands without.
