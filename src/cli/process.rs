@@ -154,6 +154,7 @@ impl Bench<'_> {
                 let robot_z = self.robot_z.and_then(|z| z.z_at(frame.captured_at));
                 let outcome = measurer
                     .measure(&frame, &self.loaded.surface(robot_z))
+                    .inspect_err(|reject| tracing::info!("frame {}: {reject}", frame.seq))
                     .map_err(|reject| reject.status());
                 let row = FrameRow { frame: frame.seq, time_s, outcome, control: None };
                 self.log.frame(&row, Some(&frame), Some(measurer.edges()))?;

@@ -4,6 +4,8 @@
 mod judge;
 mod locate;
 mod search;
+#[cfg(test)]
+mod tests;
 
 use crate::calib::SurfaceMap;
 use crate::frame::Frame;
