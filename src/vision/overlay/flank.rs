@@ -4,7 +4,7 @@
 use nalgebra::SVector;
 
 use super::Overlay;
-use super::shape::{Extent, Look, MAX_STEPS, SHADING_SD, Step, place_limit};
+use super::shape::{Extent, LEAST_BLUR_PX, Look, MAX_STEPS, SHADING_SD, Step, place_limit};
 use crate::vision::normal::Normal;
 use crate::vision::step::StepTable;
 
@@ -188,7 +188,7 @@ fn follow(look: &mut Look, moved: &SVector<f64, UNKNOWNS>) -> f64 {
     let most = 0.5 * step.blur;
     look.step = Step {
         at: step.at + moved[0].clamp(-most, most),
-        blur: (step.blur + moved[1].clamp(-0.5 * most, 0.5 * most)).max(0.3),
+        blur: (step.blur + moved[1].clamp(-0.5 * most, 0.5 * most)).max(LEAST_BLUR_PX),
         before: step.before + moved[2],
         after: step.after + moved[3],
     };
@@ -198,7 +198,8 @@ fn follow(look: &mut Look, moved: &SVector<f64, UNKNOWNS>) -> f64 {
         let Some(flank) = flank else { continue };
         flank.at += moved[first].clamp(-most, most);
         flank.height += moved[first + 1];
-        flank.blur = (flank.blur + moved[first + 2].clamp(-0.5 * most, 0.5 * most)).max(0.3);
+        flank.blur =
+            (flank.blur + moved[first + 2].clamp(-0.5 * most, 0.5 * most)).max(LEAST_BLUR_PX);
     }
     moved[0].abs() + moved[1].abs()
 }

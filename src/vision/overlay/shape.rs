@@ -8,7 +8,7 @@ use crate::vision::line::Line;
 use crate::vision::normal::Normal;
 use crate::vision::step::StepTable;
 
-const LEAST_BLUR_PX: f64 = 0.3;
+pub const LEAST_BLUR_PX: f64 = 0.3;
 const MOST_BLUR_PX: f64 = 15.0;
 pub const MAX_STEPS: usize = 16;
 /// A step \[px, or blurs\] after which another would change next to nothing: each
