@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::censor::{self, Seen};
 use super::normal::Normal;
-use super::overlay::{Overlay, Path, Profile};
+use super::overlay::{Overlay, Profile};
 use super::rank;
 use super::sheet::{Sheet, Window};
 use super::step::StepTable;
@@ -274,20 +274,20 @@ impl CutOff {
         (normal, square / f64::max(n, 1.0))
     }
 
-    /// Holds the windows of a sheet against a step that lies on a path, and says
+    /// Holds the windows of a sheet against a step where it is expected, and says
     /// how far each of so many caliper lines is from it. Returns what a window in
     /// the median leaves, in standard deviations of its noise.
     pub fn locate(
         &mut self,
         table: &StepTable,
         scene: &Scene,
-        (sheet, path, lines): (&Sheet, &impl Path, usize),
+        (sheet, lines): (&Sheet, usize),
         found: &Found,
         mut take: impl FnMut(usize, Option<Line>),
     ) -> f64 {
         self.rows.clear();
         for (number, window) in sheet.windows().iter().enumerate() {
-            let [at, before, step] = path.expected(window.middle);
+            let [at, before, step] = window.expected;
             let levels = [f64::from(before), f64::from(before + step)];
             let levels = scene.levels(&found.step, found.mean_visible, levels);
             let step = Step { at: f64::from(at), ..found.step };
@@ -423,8 +423,8 @@ mod tests {
         levels: [f32; 2],
     }
 
-    impl Path for Straight {
-        fn expected(&self, _: f32) -> [f32; 3] {
+    impl Straight {
+        fn expected(&self) -> [f32; 3] {
             [self.at, self.levels[0], self.levels[1] - self.levels[0]]
         }
     }
@@ -452,7 +452,7 @@ mod tests {
         let mut turner = Turner::default();
         let Strips::Words(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
         let mut sheet = Sheet::default();
-        sheet.read(&strip, &LINES, (0.0, 1), |_| path.at);
+        sheet.read(&strip, &LINES, (0.0, 1), |_| path.expected());
         sheet
     }
 
@@ -464,9 +464,9 @@ mod tests {
             let truth = Step { at: 60.3, blur: 1.6, visible: 175.0, hidden: 300.0 };
             let levels = if hidden_after { [175.0, 255.0] } else { [255.0, 175.0] };
             let path = Straight { at: 59.8, levels };
-            let sheet = sheet(&scene, &truth, &path);
+            let mut sheet = sheet(&scene, &truth, &path);
             let mut overlay = Overlay::default();
-            overlay.lay(&sheet, &path);
+            overlay.lay(&sheet);
             let start = Step { at: 0.0, blur: 1.2, visible: 175.0, hidden: 280.0 };
             let mut cut_off = CutOff::default();
             let found = cut_off.fit(&table, &scene, &overlay, (start, None)).unwrap();
@@ -477,8 +477,8 @@ mod tests {
             // The scatter that 40 rows allow where nothing is known before.
             assert!((0.10..0.25).contains(&found.variance.sqrt()), "{found:?}");
             let mut lines = Vec::new();
-            let path = Straight { at: 60.25, ..path };
-            let rows = (&sheet, &path, LINES.len());
+            sheet.adopt(60.25 - path.at, (0.0, 1.0));
+            let rows = (&sheet, LINES.len());
             cut_off.locate(&table, &scene, rows, &found, |_, line| lines.push(line.unwrap()));
             assert_eq!(lines.len(), 4);
             assert!(lines.iter().all(|line| (line.moved - 0.05).abs() < 0.006), "{lines:?}");

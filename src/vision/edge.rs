@@ -50,8 +50,8 @@ impl Candidates {
     /// Looks for the strongest steps of a profile's response that reach the
     /// floor. `unit` is a response of 1 in grey levels.
     #[inline(always)]
-    pub fn find(response: &[i16], floor: f32, unit: f32) -> Self {
-        let mut found = Self::default();
+    pub fn find(&mut self, response: &[i16], floor: f32, unit: f32) {
+        (self.ups, self.downs) = (0, 0);
         #[expect(clippy::cast_possible_truncation, reason = "saturates")]
         let floor = (floor / unit).ceil() as i16;
         let last = response.len().saturating_sub(1);
@@ -59,11 +59,10 @@ impl Candidates {
             if reaches(block, floor) {
                 let start = number * BLOCK;
                 for u in start.max(1)..(start + block.len()).min(last) {
-                    found.look_at([response[u - 1], response[u], response[u + 1]], u, floor, unit);
+                    self.look_at([response[u - 1], response[u], response[u + 1]], u, floor, unit);
                 }
             }
         }
-        found
     }
 
     #[inline(always)]
@@ -155,7 +154,8 @@ mod tests {
     fn a_sharp_step_responds_with_its_height_halfway_between_the_pixels() {
         let mut response = vec![0; 80];
         respond(&bar(), &mut response);
-        let found = Candidates::find(&response, 20.0, UNIT);
+        let mut found = Candidates::default();
+        found.find(&response, 20.0, UNIT);
         assert_eq!((found.up().len(), found.down().len()), (1, 1));
         assert!((found.up()[0].at - 19.5).abs() <= 0.5);
         assert!((found.up()[0].step - 80.0).abs() < 1e-3);
@@ -168,7 +168,8 @@ mod tests {
         for k in 0..20u8 {
             response[5 + 4 * usize::from(k)] = 16 * i16::from((k * 7) % 20 + 1);
         }
-        let found = Candidates::find(&response, 1.0, UNIT);
+        let mut found = Candidates::default();
+        found.find(&response, 1.0, UNIT);
         let mut steps: Vec<f32> = found.up().iter().map(|c| c.step).collect();
         steps.sort_by(f32::total_cmp);
         assert_eq!(steps, (5..=20u8).map(f32::from).collect::<Vec<f32>>());

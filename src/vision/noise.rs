@@ -39,16 +39,17 @@ pub fn of<T: Grey>(strip: &Strip<'_, T>, columns: Range<usize>) -> f32 {
     if rows * run == 0 {
         least
     } else {
-        (strip.scale * spread(&differences, rows * run)).max(least)
+        (strip.scale * spread(&differences, rows * run, strip.white.level())).max(least)
     }
 }
 
 /// Standard deviation behind `total` differences, of which those that are
-/// noise's count; the rest of the list is larger than any.
+/// noise's count; the rest of the list is larger than any. The scale ends at
+/// `white`.
 #[inline(always)]
-fn spread(differences: &[u16; ROWS * RUN], total: usize) -> f32 {
+fn spread(differences: &[u16; ROWS * RUN], total: usize, white: u32) -> f32 {
     let mut median = 0;
-    for bit in (0..16).rev() {
+    for bit in (0..(u32::BITS - white.leading_zeros()).min(16)).rev() {
         let below = (1 << bit) + median;
         if 2 * count_below(differences, below) <= total {
             median = below;

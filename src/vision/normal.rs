@@ -4,14 +4,14 @@ use nalgebra::{Cholesky, SMatrix, SVector};
 
 /// Normal equations of a small fit.
 pub struct Normal<const N: usize> {
-    matrix: SMatrix<f64, N, N>,
+    matrix: [[f64; N]; N],
     /// Right-hand side.
     pub vector: SVector<f64, N>,
 }
 
 impl<const N: usize> Default for Normal<N> {
     fn default() -> Self {
-        Self { matrix: SMatrix::zeros(), vector: SVector::zeros() }
+        Self { matrix: [[0.0; N]; N], vector: SVector::zeros() }
     }
 }
 
@@ -22,15 +22,16 @@ impl<const N: usize> Normal<N> {
         for i in 0..N {
             let weighted = weight * row[i];
             self.vector[i] += weighted * miss;
-            for (j, other) in row.iter().take(i + 1).enumerate() {
-                self.matrix[(i, j)] += weighted * other;
+            // Whole rows, of which one half would do, fit the processor's vectors.
+            for (sum, other) in self.matrix[i].iter_mut().zip(row) {
+                *sum += weighted * other;
             }
         }
     }
 
     /// Holds one unknown: `miss` from where it is held.
     pub fn hold(&mut self, which: usize, weight: f64, miss: f64) {
-        self.matrix[(which, which)] += weight;
+        self.matrix[which][which] += weight;
         self.vector[which] += weight * miss;
     }
 
@@ -40,10 +41,10 @@ impl<const N: usize> Normal<N> {
         nalgebra::Const<N>: nalgebra::DimMin<nalgebra::Const<N>>,
     {
         for k in 0..N {
-            self.matrix[(k, k)] *= 1.0 + 1e-9;
-            self.matrix[(k, k)] += 1e-12;
+            self.matrix[k][k] *= 1.0 + 1e-9;
+            self.matrix[k][k] += 1e-12;
         }
-        let cholesky = Cholesky::new(self.matrix)?;
+        let cholesky = Cholesky::new(SMatrix::from(self.matrix))?;
         let unknowns = cholesky.solve(&self.vector);
         Some(Solved { unknowns, cholesky })
     }

@@ -12,16 +12,21 @@ const MANY_SIGMA: f64 = 5.0;
 /// returns the robust standard deviation of the deviations \[px\]. `memory` is
 /// scratch; `least_px` is the least deviation that makes an outlier.
 pub fn sort_out(edges: &mut [Option<Located>], least_px: f64, memory: &mut Vec<f64>) -> f64 {
+    let count = edges.len();
     memory.clear();
-    memory.extend((0..edges.len()).map(|k| deviation(edges, k).unwrap_or(f64::NAN)));
-    // A second copy is what the median is found in.
-    for k in 0..edges.len() {
-        let deviation = memory[k];
-        if !deviation.is_nan() {
-            memory.push(deviation.abs());
-        }
+    memory.extend(edges.iter().map(|edge| edge.map_or(f64::NAN, |edge| edge.at)));
+    memory.extend_from_within(..);
+    let (places, deviations) = memory.split_at_mut(count);
+    for (k, deviation) in deviations.iter_mut().enumerate() {
+        *deviation = self::deviation(places, k).unwrap_or(f64::NAN);
     }
-    let (deviations, sizes) = memory.split_at_mut(edges.len());
+    // The median is found where the places were.
+    let mut sizes = 0;
+    for deviation in deviations.iter().filter(|deviation| !deviation.is_nan()) {
+        places[sizes] = deviation.abs();
+        sizes += 1;
+    }
+    let sizes = &mut places[..sizes];
     let Some(median) = rank::median(sizes) else { return 0.0 };
     let sigma = 1.4826 * median;
     let limit = least_px.max(MANY_SIGMA * sigma);
@@ -33,27 +38,27 @@ pub fn sort_out(edges: &mut [Option<Located>], least_px: f64, memory: &mut Vec<f
     sigma
 }
 
-/// How far an edge lies from the line between neighbours at equal distance on
+/// How far a place lies from the line between neighbours at equal distance on
 /// either side: the median over several distances. `None` where there are no
-/// such neighbours.
-fn deviation(edges: &[Option<Located>], at: usize) -> Option<f64> {
-    let here = edges[at]?.at;
+/// such neighbours; places that are none are not a number.
+fn deviation(places: &[f64], at: usize) -> Option<f64> {
+    let here = places[at];
     let mut found = [0.0; SPANS.len()];
     let mut n = 0;
     for span in SPANS {
-        let before = at.checked_sub(span).and_then(|k| edges[k]);
-        let after = edges.get(at + span).copied().flatten();
-        if let (Some(before), Some(after)) = (before, after) {
-            found[n] = here - f64::midpoint(before.at, after.at);
+        let before = at.checked_sub(span).map_or(f64::NAN, |k| places[k]);
+        let after = places.get(at + span).copied().unwrap_or(f64::NAN);
+        let off = here - f64::midpoint(before, after);
+        if !off.is_nan() {
+            found[n] = off;
             n += 1;
         }
     }
-    let found = &mut found[..n];
-    found.sort_by(f64::total_cmp);
-    match n {
-        0 => None,
-        2 => Some(f64::midpoint(found[0], found[1])),
-        _ => Some(found[n / 2]),
+    match found[..n] {
+        [] => None,
+        [one] => Some(one),
+        [one, other] => Some(f64::midpoint(one, other)),
+        [one, two, three, ..] => Some(one.max(two.min(three)).min(two.max(three))),
     }
 }
 

@@ -12,6 +12,7 @@ use super::sheet::Sheet;
 mod curved;
 mod flank;
 mod shape;
+mod slopes;
 
 pub use shape::{Extent, Look, Shape, Step};
 
@@ -37,13 +38,6 @@ const SETTLES: usize = 5;
 const VERY_UNLIKE: f32 = 3.5;
 /// Blur that the place's rounding to half a pixel adds \[px²\].
 const ROUNDING: f64 = 1.0 / 48.0;
-
-/// Where and how an edge lies in the rows of a strip.
-pub trait Path {
-    /// Position of the edge at a place along it \[px\], level before it and step
-    /// to the level after it \[grey levels\].
-    fn expected(&self, v: f32) -> [f32; 3];
-}
 
 /// How a window was laid down: at which phase, how far the path lies ahead of
 /// its pixel \[px\], of how many rows it is, and the level before the edge and
@@ -142,34 +136,37 @@ impl Default for Overlay {
 }
 
 impl Overlay {
-    /// Lays down the windows along a path.
+    /// Lays down windows where the edge is expected.
     #[inline(always)]
-    pub fn lay(&mut self, sheet: &Sheet, path: &impl Path) {
-        self.lay_down(sheet, path);
+    pub fn lay(&mut self, sheet: &Sheet) {
+        self.lay_down(sheet);
         self.average(f32::INFINITY, JUDGED);
         let [first, last] = UNLIKE;
-        let limit = first * self.judge(0.5);
-        self.average(limit, JUDGED);
         self.typical = self.judge(0.5);
+        let limit = first * self.typical;
+        if self.unlike.iter().any(|&unlike| unlike > limit) {
+            self.average(limit, JUDGED);
+            self.typical = self.judge(0.5);
+        }
         self.average(last * self.typical, 0..SPAN);
     }
 
-    /// Lays down windows along a path of which many may be covered: starts from
+    /// Lays down windows of which many may be covered: starts from
     /// those that are said to be clear and goes on with those that are most
     /// like the mean, over and over.
     #[inline(always)]
-    pub fn settle(&mut self, sheet: &Sheet, path: &impl Path, clear: impl Fn(usize) -> bool) {
-        self.lay_clear(sheet, path, clear);
+    pub fn settle(&mut self, sheet: &Sheet, clear: impl Fn(usize) -> bool) {
+        self.lay_clear(sheet, clear);
         for _ in 0..SETTLES {
             let limit = self.judge(ALIKE);
             self.average(limit, 0..SPAN);
         }
     }
 
-    /// Lays down the windows along a path that are clear, and no others.
+    /// Lays down the windows that are clear, and no others.
     #[inline(always)]
-    pub fn lay_clear(&mut self, sheet: &Sheet, path: &impl Path, clear: impl Fn(usize) -> bool) {
-        self.lay_down(sheet, path);
+    pub fn lay_clear(&mut self, sheet: &Sheet, clear: impl Fn(usize) -> bool) {
+        self.lay_down(sheet);
         for (laid, unlike) in self.phases.iter().zip(&mut self.unlike) {
             *unlike = if clear(laid.number) { 0.0 } else { f32::INFINITY };
         }
@@ -177,7 +174,7 @@ impl Overlay {
     }
 
     #[inline(always)]
-    fn lay_down(&mut self, sheet: &Sheet, path: &impl Path) {
+    fn lay_down(&mut self, sheet: &Sheet) {
         let windows = sheet.windows();
         let count = windows.len().min(ROWS);
         self.rows.clear();
@@ -185,7 +182,7 @@ impl Overlay {
         for k in 0..count {
             let number = (2 * k + 1) * windows.len() / (2 * count);
             let window = &windows[number];
-            let [at, before, step] = path.expected(window.middle);
+            let [at, before, step] = window.expected;
             let (place, phase) = split(at, PHASES);
             let start = place - window.first - REACH.cast_signed();
             let pixels = usize::try_from(start).ok().and_then(|start| {
@@ -301,19 +298,36 @@ impl Overlay {
             .map(|((row, laid), _)| (row.as_slice(), self.mean[laid.phase].as_slice()))
     }
 
-    /// Each sample's distance from the path, its value and its weight.
+    /// The means of the phases that have rows.
     #[inline(always)]
-    fn samples(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64, f64)> {
-        (0..PHASES).filter(|&phase| self.counts[phase] > 0.0).flat_map(move |phase| {
-            let shift = f64::from(self.shifts[phase]);
-            let weight = f64::from(self.counts[phase]);
-            let first = index((from + shift).ceil());
-            let last = index((to + shift).floor() + 1.0);
-            (first..last).map(move |k| {
-                let distance = place(k) - shift;
-                (distance, f64::from(self.mean[phase][k]), weight)
-            })
+    fn means(&self) -> impl Iterator<Item = Mean<'_>> {
+        let means = self.mean.iter().zip(self.shifts).zip(self.counts);
+        means.filter(|(_, count)| *count > 0.0).map(|((samples, shift), count)| Mean {
+            samples,
+            shift: shift.into(),
+            weight: count.into(),
         })
+    }
+}
+
+/// Mean of the rows of a phase.
+struct Mean<'a> {
+    samples: &'a [f32; SPAN],
+    /// Mean distance of the path from the middle sample \[px\].
+    shift: f64,
+    /// Number of rows.
+    weight: f64,
+}
+
+impl Mean<'_> {
+    /// Each sample's distance from the path and its value, from a distance to
+    /// another \[px\].
+    #[inline(always)]
+    fn samples(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
+        let first = index((from + self.shift).ceil());
+        let last = index((to + self.shift).floor() + 1.0).max(first);
+        let samples = (first..last).zip(&self.samples[first..last]);
+        samples.map(|(k, value)| (place(k) - self.shift, f64::from(*value)))
     }
 }
 

@@ -121,7 +121,9 @@ mod tests {
         }
         let mut response = vec![0; 200];
         respond(&profile, &mut response);
-        let bands = vec![Candidates::find(&response, 5.0, 0.0625); 20];
+        let mut steps = Candidates::default();
+        steps.find(&response, 5.0, 0.0625);
+        let bands = vec![steps; 20];
         let (mut up, mut down) = (Contours::default(), Contours::default());
         up.search(&bands, true, 4.0, 0.4);
         down.search(&bands, false, 4.0, 0.4);

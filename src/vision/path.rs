@@ -2,12 +2,14 @@
 //! can be held against.
 
 use super::number::{narrow, single};
-use super::overlay::Path;
 use super::pool::{Bands, middle};
 use super::rank;
 
 /// Bands on either side that a smoothed value is taken from.
 const NEIGHBOURS: usize = 3;
+
+/// By how much a bend must move the line through the neighbours to be one \[px\].
+const BENT_PX: f32 = 0.1;
 
 /// Neighbours by whose median wild values are told.
 const WILD_WINDOW: usize = 9;
@@ -125,14 +127,67 @@ pub fn smooth(values: &[f32], out: &mut Vec<f32>) {
     }
 }
 
+/// The same for values that follow a parabola, which is left as it is where it is
+/// notable: the line through the neighbours of a bent edge runs inside it.
+pub fn smooth_bent(values: &mut [f32], out: &mut Vec<f32>) {
+    let middle = 0.5 * (signed(values.len()) - 1.0);
+    let square = |band: usize| (signed(band) - middle) * (signed(band) - middle);
+    let mean = (0..values.len()).map(square).sum::<f32>() / signed(values.len()).max(1.0);
+    let (mut sum, mut norm) = (0.0, 0.0);
+    for (band, value) in values.iter().enumerate() {
+        let bent = square(band) - mean;
+        sum += bent * value;
+        norm += bent * bent;
+    }
+    let bend = if norm > 0.0 { sum / norm } else { 0.0 };
+    // The bend times the mean square of the distances is what the line is off.
+    let off = bend * single(NEIGHBOURS * (NEIGHBOURS + 1)) / 3.0;
+    if off.abs() < BENT_PX {
+        return smooth(values, out);
+    }
+    for (band, value) in values.iter_mut().enumerate() {
+        *value -= bend * (square(band) - mean);
+    }
+    smooth(values, out);
+    for (band, value) in out.iter_mut().enumerate() {
+        *value += bend * (square(band) - mean);
+    }
+}
+
 /// What is expected of an edge along the gauge: place, level before it and
 /// step, on lines between the middles of the bands.
 #[derive(Debug, Clone, Default)]
 pub struct Course {
     middles: Vec<f32>,
     values: Vec<[f32; 3]>,
+    segments: Vec<Segment>,
     /// Bands for each pixel along the bead.
     per_px: f32,
+}
+
+/// The course from the middle of a band to that of the next.
+#[derive(Debug, Clone, Copy)]
+struct Segment {
+    /// Where it begins and how long it is \[px\].
+    middle: f32,
+    length: f32,
+    /// Place, level before and step where it begins, and their changes for a
+    /// pixel.
+    values: [f32; 3],
+    slopes: [f32; 3],
+}
+
+impl Segment {
+    fn between(middles: [f32; 2], values: [[f32; 3]; 2]) -> Self {
+        let length = middles[1] - middles[0];
+        let slope = |k: usize| (values[1][k] - values[0][k]) / length;
+        Self {
+            middle: middles[0],
+            length,
+            values: values[0],
+            slopes: [slope(0), slope(1), slope(2)],
+        }
+    }
 }
 
 impl Course {
@@ -142,7 +197,7 @@ impl Course {
         self.middles.extend((0..bands.count()).map(|band| narrow(bands.middle(band))));
         self.values.clear();
         self.values.extend((0..at.len()).map(|band| [at[band], before[band], step[band]]));
-        self.measure_pitch();
+        self.link();
     }
 
     /// Moves all of it aside and takes other levels: those before and after
@@ -153,6 +208,7 @@ impl Course {
             *level += before * *step;
             *step *= after - before;
         }
+        self.link();
     }
 
     /// Draws the line anew through better places; levels stay. `memory` is
@@ -166,53 +222,45 @@ impl Course {
         std::mem::swap(&mut self.values, memory);
         self.middles.clear();
         self.middles.extend(lines.iter().map(|&line| narrow(middle(line))));
-        self.measure_pitch();
+        self.link();
     }
 
-    fn measure_pitch(&mut self) {
+    /// Draws the lines between the middles.
+    fn link(&mut self) {
         let last = self.middles.len() - 1;
         self.per_px = single(last) / (self.middles[last] - self.middles[0]).max(1.0);
+        let neighbours = self.middles.windows(2).zip(self.values.windows(2));
+        self.segments.clear();
+        self.segments.extend(neighbours.map(|(middles, values)| {
+            Segment::between([middles[0], middles[1]], [values[0], values[1]])
+        }));
     }
 
     /// Place, level before and step at a row, or between two. Beyond the first
     /// and the last band the edge runs on, but levels do not change.
     #[inline(always)]
     pub fn at(&self, v: f32) -> [f32; 3] {
-        let last = self.middles.len() - 1;
-        if last == 0 {
-            return self.values[0];
-        }
-        let mut band = floor((v - self.middles[0]) * self.per_px).min(last - 1);
+        let Some(last) = self.segments.len().checked_sub(1) else { return self.values[0] };
+        let mut band = floor((v - self.middles[0]) * self.per_px).min(last);
         // Bands differ by a row in height.
         if v < self.middles[band] && band > 0 {
             band -= 1;
-        } else if v >= self.middles[band + 1] && band + 1 < last {
+        } else if v >= self.middles[band + 1] && band < last {
             band += 1;
         }
-        let (middle, next) = (self.middles[band], self.middles[band + 1]);
-        let (here, there) = (&self.values[band], &self.values[band + 1]);
-        let share = (v - middle) / (next - middle);
-        let within = share.clamp(0.0, 1.0);
+        let Segment { middle, length, values, slopes } = self.segments[band];
+        let ahead = v - middle;
+        let within = ahead.clamp(0.0, length);
         [
-            here[0] + share * (there[0] - here[0]),
-            here[1] + within * (there[1] - here[1]),
-            here[2] + within * (there[2] - here[2]),
+            values[0] + ahead * slopes[0],
+            values[1] + within * slopes[1],
+            values[2] + within * slopes[2],
         ]
     }
 
     /// Steepest slope of the edge between two bands.
     pub fn steepest(&self) -> f32 {
-        let slopes = self.values.windows(2).zip(self.middles.windows(2));
-        slopes
-            .map(|(at, middle)| ((at[1][0] - at[0][0]) / (middle[1] - middle[0])).abs())
-            .fold(0.0, f32::max)
-    }
-}
-
-impl Path for Course {
-    #[inline(always)]
-    fn expected(&self, v: f32) -> [f32; 3] {
-        self.at(v)
+        self.segments.iter().fold(0.0, |most, segment| segment.slopes[0].abs().max(most))
     }
 }
 
@@ -264,6 +312,15 @@ mod tests {
             assert_eq!((before, step), (40.0, 80.0));
         }
         assert!((course.steepest() - 0.5).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_bent_edge_is_smoothed_where_it_is() {
+        let at = |k: usize| 200.0 + 3.0 * signed(k) - 0.2 * signed(k) * signed(k);
+        let mut bent: Vec<f32> = (0..25).map(at).collect();
+        let mut out = Vec::new();
+        smooth_bent(&mut bent, &mut out);
+        assert!(out.iter().enumerate().all(|(k, value)| (value - at(k)).abs() < 1e-3), "{out:?}");
     }
 
     #[test]

@@ -10,9 +10,12 @@ use super::strip::{Grey, Strip};
 /// edges.
 const ROWS: usize = 4;
 
+/// Distance of such rows at most \[px\].
+const MOST_APART: usize = 2;
+
 /// Profiles at most: the pick needs no more, and reading whole rows is what
 /// takes its time.
-const MOST: usize = 32;
+const MOST: usize = 25;
 
 /// Bits that a profile's sums are cut to, so that four of them fit 15.
 const BITS: u32 = 12;
@@ -111,10 +114,12 @@ pub fn middle((from, to): (usize, usize)) -> f64 {
 }
 
 /// The `k`-th of the rows that stand for a band, evenly spread and symmetric
-/// about its middle.
+/// about its middle, and in a tall band no farther apart than slanted edges
+/// allow.
 fn spread(k: usize, from: usize, to: usize) -> usize {
     let last = to - from - 1;
-    from + (2 * k * last + ROWS - 1) / (2 * (ROWS - 1))
+    let beside = last.saturating_sub(MOST_APART * (ROWS - 1)) / 2;
+    from + beside + (2 * k * (last - 2 * beside) + ROWS - 1) / (2 * (ROWS - 1))
 }
 
 #[inline(always)]

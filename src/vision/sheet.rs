@@ -25,6 +25,9 @@ pub struct Window {
     pub middle: f32,
     /// Place across the bead of the first pixel \[px\].
     pub first: isize,
+    /// Position of the edge there \[px\], level before it and step to the level
+    /// after it \[grey levels\], as they are expected.
+    pub expected: [f32; 3],
 }
 
 /// Windows along an edge; keeps its memory from frame to frame.
@@ -46,8 +49,17 @@ impl Sheet {
         &self.pixels[window]
     }
 
-    /// Reads the windows about an edge that runs through `at`, a place across
-    /// the bead for one along it, and nowhere runs aside more than `steepest`.
+    /// Expects the edge a little aside, and other levels: those before and after
+    /// it as shares of the step.
+    pub fn adopt(&mut self, aside: f32, (before, after): (f32, f32)) {
+        for window in &mut self.windows {
+            let [at, level, step] = window.expected;
+            window.expected = [at + aside, level + before * step, (after - before) * step];
+        }
+    }
+
+    /// Reads the windows about an edge of which `expected` is told for a place
+    /// along it, and which nowhere runs aside more than `steepest`.
     /// Rows are taken together within caliper lines: one where there are few,
     /// more, but no more than `most`, where a tall gauge has plenty.
     #[inline(always)]
@@ -56,7 +68,7 @@ impl Sheet {
         strip: &Strip<'_, T>,
         lines: &[(usize, usize)],
         (steepest, most): (f32, usize),
-        at: impl Fn(f32) -> f32,
+        expected: impl Fn(f32) -> [f32; 3],
     ) {
         let together = rows_together(strip.along, lines.len(), steepest).min(most);
         self.windows.clear();
@@ -65,8 +77,9 @@ impl Sheet {
             while v < to {
                 let rows = together.min(to - v);
                 let middle = single(2 * v + rows - 1) / 2.0;
-                let first = floor(at(middle)) - MIDDLE.cast_signed();
-                self.windows.push(Window { line, rows: single(rows), middle, first });
+                let expected = expected(middle);
+                let first = floor(expected[0]) - MIDDLE.cast_signed();
+                self.windows.push(Window { line, rows: single(rows), middle, first, expected });
                 v += rows;
             }
         }

@@ -115,8 +115,11 @@ impl PlainSums {
 /// Place and levels that a row is held against.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Expected {
-    /// Position of the edge \[px\].
+    /// Position of the edge \[px\], within a sixteenth of a pixel of the one that
+    /// was asked for: a pixel and a phase.
     pub at: f32,
+    place: isize,
+    phase: usize,
     /// Level before it \[grey levels\].
     pub before: f32,
     /// Step to the level after it \[grey levels\].
@@ -127,6 +130,19 @@ pub struct Expected {
     /// The same for pixels of the step, where the place may be off a little
     /// \[grey levels\].
     pub tolerance_at_step: f32,
+}
+
+impl Expected {
+    /// A place, the level before it and the step to the level after it, and how
+    /// far pixels may be off beside the step and on it.
+    #[inline(always)]
+    pub fn new([at, before, step]: [f32; 3], tolerances: [f32; 2]) -> Self {
+        let (place, phase) = split(at, PHASES);
+        #[expect(clippy::cast_precision_loss, reason = "a place near the gauge, few phases")]
+        let at = place as f32 + phase as f32 / PHASES as f32;
+        let [tolerance, tolerance_at_step] = tolerances;
+        Self { at, place, phase, before, step, tolerance, tolerance_at_step }
+    }
 }
 
 impl Default for Template {
@@ -191,18 +207,6 @@ impl Template {
         [count(&parts[..self.core.start]), count(&parts[self.core.end..])]
     }
 
-    /// The place at which a row is sampled, which lies within a sixteenth of a
-    /// pixel of the one that was asked for \[px\].
-    #[inline(always)]
-    pub fn sampled(at: f32) -> f32 {
-        #[expect(clippy::cast_precision_loss, reason = "there are few phases")]
-        let phases = PHASES as f32;
-        let (place, phase) = split(at, PHASES);
-        #[expect(clippy::cast_precision_loss, reason = "a place near the gauge")]
-        let (place, phase) = (place as f32, phase as f32);
-        place + phase / phases
-    }
-
     /// Holds a window against the edge; `None` where the edge lies too near its
     /// end.
     #[inline(always)]
@@ -212,7 +216,7 @@ impl Template {
         expected: &Expected,
         plain: &mut PlainSums,
     ) -> Option<RowSums> {
-        let (place, phase) = split(expected.at, PHASES);
+        let Expected { place, phase, .. } = *expected;
         let reach = (self.core.start * LANES + self.core.len() * LANES / 2).cast_signed();
         let start = usize::try_from(place - reach - first).ok()?;
         let pixels = pixels.get(start..start + self.chunks * LANES)?;
@@ -228,7 +232,6 @@ impl Template {
         expected: &Expected,
         plain: &mut PlainSums,
     ) -> RowSums {
-        let mut sums = RowSums::default();
         let (before, rest) = parts.split_at(self.core.start);
         let (core, after) = rest.split_at(self.core.len());
         let (pixels_before, rest) = pixels.split_at(before.len() * LANES);
@@ -237,23 +240,19 @@ impl Template {
         for (part, pixels) in core.iter().zip(pixels_core.chunks_exact(LANES)) {
             for k in 0..LANES {
                 let miss = residual(part, k, pixels[k], expected) * part.mask[k];
-                let wild = if miss.abs() > expected.tolerance_at_step { 1.0 } else { 0.0 };
-                let miss = miss * (1.0 - wild);
-                lanes[4][k] += wild;
+                let off = if miss.abs() > expected.tolerance_at_step { 1.0 } else { 0.0 };
+                let miss = miss * (1.0 - off);
+                lanes[4][k] += off;
                 lanes[0][k] += miss * part.slope[k];
                 lanes[1][k] += miss * miss;
                 lanes[2][k] += miss;
                 lanes[3][k] += miss * part.after[k];
             }
         }
-        sums.slope = total(&lanes[0]);
-        sums.squares = total(&lanes[1]);
-        sums.after = total(&lanes[3]);
-        sums.before = total(&lanes[2]) - sums.after;
-        sums.wild = total(&lanes[4]);
         add_plain(before, pixels_before, expected, &mut plain.before);
         add_plain(after, pixels_after, expected, &mut plain.after);
-        sums
+        let [slope, squares, all, after, wild] = lanes.map(|lanes| total(&lanes));
+        RowSums { slope, squares, before: all - after, after, wild }
     }
 }
 

@@ -29,7 +29,7 @@ const MAX_PASSES: usize = 3;
 /// Distance of the path from the edge from which on pixels are read anew \[px\].
 const FAR_ASIDE_PX: f64 = 4.0;
 /// Share of the blur by which a path may be off.
-const NEAR_ENOUGH: f64 = 0.3;
+const NEAR_ENOUGH: f64 = 0.2;
 /// Standard deviations beyond which a pixel or a row is not noise.
 const MANY_SIGMA: f32 = 4.5;
 /// Rows that are taken together at most.
@@ -201,7 +201,7 @@ impl Tracer {
             return None;
         }
         self.read(scene);
-        self.overlay.lay(&self.sheet, &self.course);
+        self.overlay.lay(&self.sheet);
         let noise = f64::from(scene.noise) / f64::from(typical(&self.step).abs());
         self.seen = self.overlay.look(table, noise, self.room(scene));
         self.look_for_texture(scene, noise);
@@ -222,7 +222,7 @@ impl Tracer {
             return false;
         }
         path::median_of_three(&mut self.path);
-        path::smooth(&self.path, &mut self.rough);
+        path::smooth_bent(&mut self.path, &mut self.rough);
         std::mem::swap(&mut self.rough, &mut self.path);
         self.pick_levels(scene);
         self.course.draw(scene.bands, &self.path, &self.before, &self.step);
@@ -363,7 +363,7 @@ impl Tracer {
         let Step { at, before, after, .. } = shape.step;
         let height = after - before;
         let flanks = shape.flanks.about(at, height);
-        self.course.adopt(narrow(at), (narrow(before), narrow(after)));
+        self.shift_course(at, (before, after));
         Shape {
             step: Step { at: 0.0, before: 0.0, after: 1.0, ..shape.step },
             shading: shape.shading.map(|shading| shading.of(height)),
@@ -373,13 +373,21 @@ impl Tracer {
         }
     }
 
+    /// Moves what is expected aside and takes other levels: those before and after
+    /// the edge as shares of the step.
+    fn shift_course(&mut self, aside: f64, (before, after): (f64, f64)) {
+        let levels = (narrow(before), narrow(after));
+        self.course.adopt(narrow(aside), levels);
+        self.sheet.adopt(narrow(aside), levels);
+    }
+
     /// Reads the pixels along the path.
     #[inline(always)]
     fn read<T: Grey>(&mut self, scene: &Scene<'_, T>) {
         let course = &self.course;
         let most = if self.sort_rows { 1 } else { MOST_TOGETHER };
         let how = (course.steepest(), most);
-        self.sheet.read(scene.strip, scene.lines, how, |v| course.at(v)[0]);
+        self.sheet.read(scene.strip, scene.lines, how, |v| course.at(v));
     }
 
     /// Draws the path anew through the edges that were found.

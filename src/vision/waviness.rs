@@ -180,8 +180,8 @@ pub fn legendre(t: f64) -> [f64; ORDERS] {
     let mut values = [t; ORDERS];
     let (mut before, mut here) = (1.0, t);
     for (k, value) in values.iter_mut().enumerate().skip(1) {
-        let n = float(k);
-        (before, here) = (here, ((2.0 * n + 1.0) * t * here - n * before) / (n + 1.0));
+        let (n, next) = (float(k), 1.0 / float(k + 1));
+        (before, here) = (here, ((2.0 * n + 1.0) * t * here - n * before) * next);
         *value = here;
     }
     values

@@ -53,12 +53,12 @@ impl Work {
         let floor = least.max(FLOOR_SIGMA * noise);
         #[expect(clippy::cast_precision_loss, reason = "REACH is small")]
         let unit = self.bands.unit() / REACH as f32;
-        self.candidates.clear();
-        for band in 0..self.bands.count() {
+        self.candidates.resize(self.bands.count(), Candidates::default());
+        for (band, candidates) in self.candidates.iter_mut().enumerate() {
             let profile = self.bands.profile(band);
             self.response.resize(profile.len(), 0);
             respond(profile, &mut self.response);
-            self.candidates.push(Candidates::find(&self.response, floor, unit));
+            candidates.find(&self.response, floor, unit);
         }
         #[expect(clippy::cast_precision_loss, reason = "a band has few rows")]
         let band_px = strip_rows(&self.bands) as f32 / self.bands.count().max(1) as f32;

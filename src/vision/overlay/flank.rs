@@ -120,33 +120,27 @@ impl Overlay {
     /// Normal equations about an edge and its flanks, and the mean square of
     /// what they leave.
     fn linearise_flanks(&self, table: &StepTable, look: &Look) -> (Normal<UNKNOWNS>, f64) {
-        let Look { step: edge, shading, flanks, .. } = look;
+        let flanks = &look.flanks;
         let Extent { before: from, after: to } = reach(look);
-        let height = edge.after - edge.before;
         let mut normal = Normal::default();
         let many = 3.0 * flanks.0.iter().flatten().map(|_| 1.0).sum::<f64>();
         let (mut square, mut n) = (0.0, -6.0 - many);
-        for (at, value, weight) in self.samples(-from, to) {
-            let z = (at - edge.at) / edge.blur;
-            let (step, density) = table.at(z);
-            let depth = [density - z * (1.0 - step), density + z * step].map(|d| d * edge.blur);
-            let slope = height * density / edge.blur;
-            let mut row = [0.0; UNKNOWNS];
-            row[..6].copy_from_slice(&[-slope, -slope * z, 1.0 - step, step, depth[0], depth[1]]);
-            let mut miss = value
-                - edge.before * (1.0 - step)
-                - edge.after * step
-                - shading[0] * depth[0]
-                - shading[1] * depth[1];
-            for ((flank, sign), first) in flanks.0.iter().zip([-1.0, 1.0]).zip(FLANKS) {
-                let Some(flank) = flank else { continue };
-                let (adds, slopes) = flank.reaches(table, at, sign);
-                miss -= adds;
-                row[first..first + 3].copy_from_slice(&slopes);
+        for mean in self.means() {
+            for (at, value) in mean.samples(-from, to) {
+                let mut row = [0.0; UNKNOWNS];
+                let (own, level) = look.linear_at(table, at);
+                row[..6].copy_from_slice(&own);
+                let mut miss = value - level;
+                for ((flank, sign), first) in flanks.0.iter().zip([-1.0, 1.0]).zip(FLANKS) {
+                    let Some(flank) = flank else { continue };
+                    let (adds, slopes) = flank.reaches(table, at, sign);
+                    miss -= adds;
+                    row[first..first + 3].copy_from_slice(&slopes);
+                }
+                square += mean.weight * miss * miss;
+                n += 1.0;
+                normal.add(row, miss, mean.weight);
             }
-            square += weight * miss * miss;
-            n += 1.0;
-            normal.add(row, miss, weight);
         }
         (normal, square / f64::max(n, 1.0))
     }

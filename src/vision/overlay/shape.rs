@@ -3,7 +3,8 @@
 
 use super::flank::Flank;
 pub(super) use super::flank::Flanks;
-use super::{Overlay, REACH, ROUNDING, SPAN};
+use super::slopes::Slopes;
+use super::{Overlay, REACH, ROUNDING};
 use crate::vision::line::Line;
 use crate::vision::normal::Normal;
 use crate::vision::step::StepTable;
@@ -13,10 +14,7 @@ const MOST_BLUR_PX: f64 = 15.0;
 pub const MAX_STEPS: usize = 16;
 /// A step \[px, or blurs\] after which another would change next to nothing: each
 /// squares what is left.
-const CONVERGED: f64 = 2e-3;
-/// Slope that shows another step beside the edge, times the blur: a twelfth of
-/// what the edge itself has.
-const NOTABLE: f64 = 0.032;
+const CONVERGED: f64 = 8e-3;
 /// Shading that is usual close to an edge, as a standard deviation \[1/px\].
 pub const SHADING_SD: f64 = 0.02;
 
@@ -81,6 +79,24 @@ impl Look {
             (whole((near - self.step.at).ceil()), to(self.room.before)),
             (whole((near + self.step.at).ceil()), to(self.room.after)),
         ]
+    }
+
+    /// Derivatives of the level at a distance from the path for the step's place
+    /// and blur, its two levels and the two shadings, and the level itself,
+    /// without flanks.
+    #[inline(always)]
+    pub(super) fn linear_at(&self, table: &StepTable, at: f64) -> ([f64; 6], f64) {
+        let Self { step: edge, shading, .. } = self;
+        let per_blur = 1.0 / edge.blur;
+        let z = (at - edge.at) * per_blur;
+        let (step, density) = table.at(z);
+        let depth = [density - z * (1.0 - step), density + z * step].map(|d| d * edge.blur);
+        let slope = (edge.after - edge.before) * density * per_blur;
+        let level = edge.before * (1.0 - step)
+            + edge.after * step
+            + shading[0] * depth[0]
+            + shading[1] * depth[1];
+        ([-slope, -slope * z, 1.0 - step, step, depth[0], depth[1]], level)
     }
 
     /// The same look up to half-way to the steps beside the edge.
@@ -159,10 +175,11 @@ impl Overlay {
     /// fitted.
     #[inline(always)]
     pub fn look(&self, table: &StepTable, noise: f64, room: Extent) -> Option<Look> {
-        let (slope, at) = self.steepest(room)?;
+        let slopes = Slopes::of(self);
+        let (slope, at) = slopes.steepest(room)?;
         let blur = (0.2 / slope).clamp(0.5, MOST_BLUR_PX);
         let step = Step { at, blur, before: 0.0, after: 1.0 };
-        let (room, flanks) = self.up_to_neighbours(step, noise, room);
+        let (room, flanks) = self.up_to_neighbours(&slopes, step, noise, room);
         let look = Look {
             step,
             blur_sd: f64::INFINITY,
@@ -230,101 +247,28 @@ impl Overlay {
         fitted.or_else(|| self.fit(table, look.without_flanks(), Some(blur)))
     }
 
-    /// Steepest slope of the overlay near the path \[1/px\], and where.
-    #[inline(always)]
-    fn steepest(&self, room: Extent) -> Option<(f64, f64)> {
-        let (from, to) = (halves(-room.before.min(8.0)), halves(room.after.min(8.0)));
-        let mut best = (0.0, 0);
-        for half in from..=to {
-            let slope = self.slope(half);
-            if slope > best.0 {
-                best = (slope, half);
-            }
-        }
-        (best.0 > 0.01).then_some((f64::from(best.0), f64::from(best.1) / 2.0))
-    }
-
-    /// Mean slope over two pixels about a distance in half pixels, of both
-    /// phases \[1/px\].
-    #[inline(always)]
-    fn slope(&self, half: i16) -> f32 {
-        let (mut sum, mut n) = (0.0, 0.0);
-        let middle = i16::try_from(REACH).unwrap_or(0);
-        for (phase, mean) in (0i16..).zip(&self.mean) {
-            let weight = self.counts[usize::from(phase.unsigned_abs())];
-            // The nearest sample, of two as near the one farther out.
-            let twice = half + phase;
-            let k = i16::midpoint(twice, twice.signum()) + middle;
-            let k = usize::try_from(k).unwrap_or(0).clamp(1, SPAN - 2);
-            sum += weight * 0.5 * (mean[k + 1] - mean[k - 1]);
-            n += weight;
-        }
-        sum / n.max(1.0)
-    }
-
     /// Cuts the room off half-way to a neighbouring step: where the slope has
     /// fallen off and rises again, in either direction. Tells the steps too,
     /// roughly.
     #[inline(always)]
-    fn up_to_neighbours(&self, start: Step, noise: f64, room: Extent) -> (Extent, Flanks) {
-        let noise = noise / (2.0 * self.used().max(1.0)).sqrt();
-        let (before, flank_before) = self.up_to_neighbour(start, noise, (-1, room.before));
-        let (after, flank_after) = self.up_to_neighbour(start, noise, (1, room.after));
-        (Extent { before, after }, Flanks([flank_before, flank_after]))
-    }
-
-    #[expect(clippy::cast_possible_truncation, reason = "a slope needs no more")]
-    #[inline(always)]
-    fn up_to_neighbour(
+    fn up_to_neighbours(
         &self,
+        slopes: &Slopes,
         start: Step,
         noise: f64,
-        (sign, room): (i16, f64),
-    ) -> (f64, Option<Flank>) {
-        let notable = (5.0 * noise).max(NOTABLE / start.blur.max(1.0)) as f32;
-        let first = (0.5 * start.blur).clamp(0.5, 3.0);
-        let mut lowest = (f32::INFINITY, room);
-        let from = halves(start.at + f64::from(sign) * first);
-        let last = halves(room - 1.0 - first);
-        for step in 0..last {
-            let slope = self.slope(from + sign * step).abs();
-            if slope < lowest.0 {
-                lowest = (slope, first + f64::from(step) / 2.0);
-            }
-            if slope > lowest.0 + notable {
-                return (lowest.1, self.flank(start.blur, (from, sign, step..last)));
-            }
-        }
-        (room, None)
-    }
-
-    /// The step whose slope rises from a place on, in half pixels.
-    #[cold]
-    fn flank(
-        &self,
-        blur: f64,
-        (from, sign, steps): (i16, i16, std::ops::Range<i16>),
-    ) -> Option<Flank> {
-        let mut best = (0.0f32, 0, 0.0f32);
-        for step in steps {
-            let half = from + sign * step;
-            let slope = self.slope(half);
-            if slope.abs() < 0.7 * best.0 {
-                break;
-            }
-            if slope.abs() > best.0 {
-                best = (slope.abs(), half, slope);
-            }
-        }
-        let (_, half, slope) = best;
-        let height = f64::from(sign) * f64::from(slope) * blur * std::f64::consts::TAU.sqrt();
-        (half != 0).then_some(Flank { at: f64::from(half) / 2.0, height, blur })
+        room: Extent,
+    ) -> (Extent, Flanks) {
+        let noise = noise / (2.0 * self.used().max(1.0)).sqrt();
+        let (before, flank_before) = slopes.up_to_neighbour(start, noise, (-1, room.before));
+        let (after, flank_after) = slopes.up_to_neighbour(start, noise, (1, room.after));
+        (Extent { before, after }, Flanks([flank_before, flank_after]))
     }
 
     /// Fits place, blur, levels and a little shading about the edge.
     #[inline(always)]
     fn fit(&self, table: &StepTable, start: Look, known: Option<(f64, f64)>) -> Option<Look> {
         let mut look = start;
+        let mut last = None;
         // Shading is held near none, because over a short way it could pass
         // for a shift of the edge.
         for _ in 0..MAX_STEPS {
@@ -349,11 +293,12 @@ impl Overlay {
             };
             look.shading[0] += moved[4];
             look.shading[1] += moved[5];
-            look.blur_sd = look.noise * solved.variance(1).max(0.0).sqrt();
+            last = Some(solved);
             if moved[0].abs() < CONVERGED && moved[1].abs() < CONVERGED * step.blur {
                 break;
             }
         }
+        look.blur_sd = look.noise * last?.variance(1).max(0.0).sqrt();
         let inside = look.step.at > -look.room.before && look.step.at < look.room.after;
         (inside && look.step.after - look.step.before > 0.1).then_some(look)
     }
@@ -362,27 +307,20 @@ impl Overlay {
     /// for a sample of weight 1.
     #[inline(always)]
     fn linearise(&self, table: &StepTable, look: &Look) -> (Normal<6>, f64) {
-        let Look { step: edge, room, shading, .. } = *look;
+        let Look { step: edge, room, .. } = *look;
         let reach = 4.5 * edge.blur + 2.0;
         let from = (edge.at - reach.min(room.before)).max(-place_limit());
         let to = (edge.at + reach.min(room.after)).min(place_limit());
-        let height = edge.after - edge.before;
         let mut normal = Normal::<6>::default();
         let (mut square, mut n) = (0.0, -6.0);
-        for (distance, value, weight) in self.samples(from, to) {
-            let z = (distance - edge.at) / edge.blur;
-            let (step, density) = table.at(z);
-            let depth = [density - z * (1.0 - step), density + z * step].map(|d| d * edge.blur);
-            let slope = height * density / edge.blur;
-            let miss = value
-                - edge.before * (1.0 - step)
-                - edge.after * step
-                - shading[0] * depth[0]
-                - shading[1] * depth[1];
-            square += weight * miss * miss;
-            n += 1.0;
-            let row = [-slope, -slope * z, 1.0 - step, step, depth[0], depth[1]];
-            normal.add(row, miss, weight);
+        for mean in self.means() {
+            for (at, value) in mean.samples(from, to) {
+                let (row, level) = look.linear_at(table, at);
+                let miss = value - level;
+                square += mean.weight * miss * miss;
+                n += 1.0;
+                normal.add(row, miss, mean.weight);
+            }
         }
         (normal, square / f64::max(n, 1.0))
     }
@@ -419,11 +357,13 @@ impl Overlay {
     ) {
         let height = step.after - step.before;
         let (near, far) = (step.at + sign * from, step.at + sign * (from + 2.0));
-        for (at, value, weight) in self.samples(near.min(far), near.max(far) - 1e-9) {
-            let (share, _) = table.at((at - step.at) / step.blur);
-            let beside = if flanks.any() { flanks.at(table, at) } else { 0.0 };
-            let off = value - beside - step.before - height * share;
-            add(sign * (at - step.at), off, weight);
+        for mean in self.means() {
+            for (at, value) in mean.samples(near.min(far), near.max(far) - 1e-9) {
+                let (share, _) = table.at((at - step.at) / step.blur);
+                let beside = if flanks.any() { flanks.at(table, at) } else { 0.0 };
+                let off = value - beside - step.before - height * share;
+                add(sign * (at - step.at), off, mean.weight);
+            }
         }
     }
 
@@ -467,10 +407,4 @@ impl Overlay {
 #[expect(clippy::cast_precision_loss, reason = "the window is short")]
 pub fn place_limit() -> f64 {
     REACH as f64 - 1.0
-}
-
-/// A distance in half pixels.
-#[expect(clippy::cast_possible_truncation, reason = "the window is short")]
-fn halves(distance: f64) -> i16 {
-    (2.0 * distance).round() as i16
 }

@@ -13,14 +13,8 @@ const BLUR_PX: f64 = 1.6;
 /// Standard deviation of a pixel of 8 bits in shares of a step of 80 levels.
 const NOISE: f64 = 0.05;
 
-/// A path that lies a little off the edge.
-struct Straight;
-
-impl Path for Straight {
-    fn expected(&self, _: f32) -> [f32; 3] {
-        [79.8, 70.0, 80.0]
-    }
-}
+/// What is expected: a place a little off the edge, and levels.
+const EXPECTED: [f32; 3] = [79.8, 70.0, 80.0];
 
 /// A step from 70 to 150 at 80.3 px and what lies beside it, without noise.
 fn overlay(beside: impl Fn(f64) -> f64) -> Overlay {
@@ -38,9 +32,9 @@ fn overlay(beside: impl Fn(f64) -> f64) -> Overlay {
     let mut turner = Turner::default();
     let Strips::Words(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
     let mut sheet = Sheet::default();
-    sheet.read(&strip, &LINES, (0.0, 1), |_| 79.8);
+    sheet.read(&strip, &LINES, (0.0, 1), |_| EXPECTED);
     let mut overlay = Overlay::default();
-    overlay.lay(&sheet, &Straight);
+    overlay.lay(&sheet);
     overlay
 }
 

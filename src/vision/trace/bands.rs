@@ -75,6 +75,7 @@ impl Tracer {
     #[inline(always)]
     fn extra_variance(&mut self, core: Matrix3<f64>, variance: f64, side: usize) -> f64 {
         let Some(inverse) = core.try_inverse() else { return 0.0 };
+        let level = inverse.row(side + 1).transpose();
         self.scatter.clear();
         let mut explained = 0.0;
         for sums in &self.solved {
@@ -82,9 +83,10 @@ impl Tracer {
             if sums.rows < 1.0 || count < 1.0 {
                 continue;
             }
-            let at_edge = (inverse * Vector3::from(sums.vector))[side + 1] / sums.rows;
-            let off = at_edge - sum / count;
-            let expected = variance * (inverse[(side + 1, side + 1)] / sums.rows + 1.0 / count);
+            let (per_row, per_pixel) = (1.0 / sums.rows, 1.0 / count);
+            let at_edge = level.dot(&Vector3::from(sums.vector)) * per_row;
+            let off = at_edge - sum * per_pixel;
+            let expected = variance * (level[side + 1] * per_row + per_pixel);
             explained += expected;
             self.scatter.push(off * off / expected);
         }

@@ -60,12 +60,12 @@ impl Tracer {
         let Step { at, blur, .. } = seen.step;
         let start = cut_off::Step { at, blur, visible, hidden: END + 0.3 * (END - visible) };
         let rough = self.cut_off.fit(table, &task, &self.overlay, (start, None))?;
-        self.course.adopt(narrow(rough.step.at), (0.0, 1.0));
+        self.shift_course(rough.step.at, (0.0, 1.0));
         self.locate_cut_off(table, scene, &task, &rough);
         // A path that jitters rounds off the corner at the end of the scale,
         // which looks like a higher level.
         self.straighten(scene);
-        self.overlay.lay(&self.sheet, &self.course);
+        self.overlay.lay(&self.sheet);
         let start = cut_off::Step { at: 0.0, ..rough.step };
         let first = self.cut_off.fit(table, &task, &self.overlay, (start, None))?;
         // The surroundings that can be seen, beside the step as it really is.
@@ -82,7 +82,7 @@ impl Tracer {
         let per_level = std::f64::consts::PI * found.step.blur * found.step.blur;
         self.blur_px = found.step.blur;
         self.common_variance = found.variance + per_level * doubt / (after - before).powi(2);
-        self.course.adopt(narrow(found.step.at), (0.0, 1.0));
+        self.shift_course(found.step.at, (0.0, 1.0));
         self.locate_cut_off(table, scene, &task, &found);
         self.state = State::Open;
         Some(found)
@@ -116,7 +116,7 @@ impl Tracer {
             let (edges, course) = (&mut self.edges, &self.course);
             let mut off: f64 = 0.0;
             edges.clear();
-            let rows = (&self.sheet, course, scene.lines.len());
+            let rows = (&self.sheet, scene.lines.len());
             self.misfit = self.cut_off.locate(table, task, rows, found, |line, located| {
                 edges.push(located.map(|located| {
                     let [path, _, _] = course.at(narrow(pool::middle(scene.lines[line])));

@@ -8,7 +8,7 @@ use super::{MANY_SIGMA, Scene, Tracer, float, narrow};
 use crate::vision::pool;
 use crate::vision::rank;
 use crate::vision::strip::Grey;
-use crate::vision::template::{Expected, PlainSums, RowSums, Template};
+use crate::vision::template::{Expected, PlainSums, RowSums};
 
 /// A row that fits worse than the median by so many times does not count.
 const UNLIKE: f32 = 2.5;
@@ -42,24 +42,28 @@ impl Tracer {
     /// Holds every window against the edge.
     #[inline(always)]
     pub(super) fn hold<T: Grey>(&mut self, scene: &Scene<'_, T>) {
-        let stiffness = narrow(self.template.products.slope_slope);
+        let softness = 1.0 / narrow(self.template.products.slope_slope);
         self.groups.clear();
         self.plain.clear();
         self.plain.resize(scene.lines.len(), PlainSums::default());
+        // Rows of a window and the noise of a pixel in it.
+        let mut of = (0.0, 0.0);
         for (number, window) in self.sheet.windows().iter().enumerate() {
             let (band, weight) = (window.line, window.rows);
             if self.clear.get(number) == Some(&false) {
                 self.groups.push(Group::hidden(band, weight));
                 continue;
             }
-            let [path, before, step] = self.course.at(window.middle);
-            let noise = self.pixel_variance(scene, weight).sqrt();
-            let expected = Self::expected([path, before, step], noise);
+            let [path, _, step] = window.expected;
+            if (weight - of.0).abs() > 0.0 {
+                of = (weight, self.pixel_variance(scene, weight).sqrt());
+            }
+            let expected = Self::expected(window.expected, of.1);
             let pixels = (self.sheet.pixels(number).as_slice(), window.first);
             let sums = self.template.hold(pixels, &expected, &mut self.plain[band]);
             let sums = sums.unwrap_or(RowSums::OUT_OF_SIGHT);
             let ahead = expected.at - path;
-            let moved = ahead - sums.slope / (step * stiffness);
+            let moved = ahead - sums.slope * softness / step;
             let misfit = self.misfit(&sums, weight);
             self.groups.push(Group { band, weight, ahead, sums, moved, misfit });
         }
@@ -67,15 +71,9 @@ impl Tracer {
 
     /// What the mean of some rows is held against, whose pixels have a noise.
     #[inline(always)]
-    pub(super) fn expected([path, before, step]: [f32; 3], noise: f32) -> Expected {
-        let noise = MANY_SIGMA * noise;
-        Expected {
-            at: Template::sampled(path),
-            before,
-            step,
-            tolerance: noise + 0.05 * step.abs(),
-            tolerance_at_step: noise + 0.15 * step.abs(),
-        }
+    pub(super) fn expected(edge: [f32; 3], noise: f32) -> Expected {
+        let (noise, step) = (MANY_SIGMA * noise, edge[2].abs());
+        Expected::new(edge, [noise + 0.05 * step, noise + 0.15 * step])
     }
 
     /// Sum of the squares of what does not fit, as if of a single row, so that

@@ -169,7 +169,7 @@ impl Tracer {
         self.read(scene);
         let (windows, trusted) = (self.sheet.windows(), &self.trusted);
         let clear = |number: usize| trusted[scene.bands.band_of(windows[number].middle)];
-        self.overlay.settle(&self.sheet, &self.course, clear);
+        self.overlay.settle(&self.sheet, clear);
         for _ in 0..PASSES {
             let shape = self.read_shape(table, scene)?;
             self.template.tabulate(table, &shape, false);
@@ -181,7 +181,7 @@ impl Tracer {
             self.follow(scene);
             self.read(scene);
             let clear = &self.clear;
-            self.overlay.lay_clear(&self.sheet, &self.course, |number| clear[number]);
+            self.overlay.lay_clear(&self.sheet, |number| clear[number]);
         }
         Some(self.clear_share())
     }
@@ -322,7 +322,7 @@ impl Tracer {
         for (number, (group, clear)) in self.groups.iter().zip(&self.clear).enumerate() {
             let window = &windows[number];
             let at = self.picked[scene.bands.band_of(window.middle)];
-            let [path, before, step] = self.course.at(window.middle);
+            let [path, before, step] = window.expected;
             if *clear || group.misfit <= limit || at.is_nan() || (at - path).abs() < ELSEWHERE_PX {
                 run = 0.0;
                 continue;
