@@ -38,6 +38,7 @@ mod axis;
 mod blur;
 mod censor;
 mod contour;
+mod corner;
 mod covered;
 mod curve;
 mod cut_off;

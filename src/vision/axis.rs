@@ -8,7 +8,8 @@ use crate::calib::SurfaceMap;
 use crate::geometry::SurfacePoint;
 use crate::units::Mm;
 
-use super::curve::{Curve, Point};
+use super::corner;
+use super::curve::{Curve, NOTABLE_PX, Point};
 use super::gauge::Gauge;
 use super::number::float;
 use super::reject::Reject;
@@ -95,7 +96,7 @@ pub fn width(
     memory: &mut Memory,
 ) -> Result<WidthMeasurement, Reject> {
     let failed = Reject::NoPair { got: 0.0, need: 0.0 };
-    let curve = |side: usize| Curve::fit(scene.points(side)).ok_or(failed);
+    let curve = |side: usize| Curve::fit(scene.points(side), scene.reach()).ok_or(failed);
     let curves = [curve(0)?, curve(1)?];
     let slant_rad = scene.slant(&curves)?;
     let sections = Sections::cut(scene, &curves).ok_or(Reject::OffSurface)?;
@@ -185,6 +186,14 @@ impl Scene<'_> {
 
     /// Refuses corners.
     fn check_bend(&self, left: &Curve, right: &Curve) -> Result<(), Reject> {
+        let turn = |side: usize, curve: &Curve| {
+            let off = curve.about_parabola;
+            let notable = off > NOTABLE_PX * NOTABLE_PX;
+            if notable { corner::turn(&self.points(side), off, self.reach()) } else { 0.0 }
+        };
+        if corner::is_corner([turn(0, left), turn(1, right)]) {
+            return Err(Reject::Corner { got_widths: 0.0, least_widths: LEAST_RADIUS });
+        }
         let square = self.reach() * self.reach();
         // Towards the ends a short polynomial follows waviness too eagerly.
         for (t, _) in &NODES[1..4] {
@@ -204,9 +213,9 @@ impl Scene<'_> {
         Ok(())
     }
 
-    /// Square of the cosine between the bead and the gauge's axis.
-    fn cosine_squared(&self, curves: &[Curve; 2]) -> f64 {
-        let slope = f64::midpoint(curves[0].slope(0.0), curves[1].slope(0.0)) / self.reach();
+    /// Square of the cosine between the bead and the gauge's axis at a place.
+    fn cosine_squared(&self, curves: &[Curve; 2], t: f64) -> f64 {
+        let slope = f64::midpoint(curves[0].slope(t), curves[1].slope(t)) / self.reach();
         1.0 / (1.0 + slope * slope)
     }
 
@@ -222,11 +231,12 @@ impl Scene<'_> {
     ) -> Option<[f64; CURVED]> {
         let mut off = [[0.0; ORDERS]; 2];
         let mut bands = [0.0f64; 2];
-        for (side, places) in memory.off.iter().enumerate() {
-            for (band, place) in places.iter().enumerate() {
+        for (band, places) in memory.off[0].iter().zip(&memory.off[1]).enumerate() {
+            let values = legendre(self.place(band));
+            for (side, place) in [places.0, places.1].into_iter().enumerate() {
                 let Some(place) = place else { continue };
                 bands[side] += 1.0;
-                for (sum, value) in off[side].iter_mut().zip(legendre(self.place(band))) {
+                for (sum, value) in off[side].iter_mut().zip(values) {
                     *sum += place * value;
                 }
             }
@@ -326,6 +336,9 @@ struct Sections {
     /// Part of the lines across the gauge that runs along the bead, mean
     /// \[mm\].
     oblique: f64,
+    /// The same times the direction that a bend of 1 px gives the axis there, for
+    /// half a gauge of 1 px.
+    oblique_by_bend: f64,
     /// Millimetres normal to the bead for a pixel across the gauge, left and
     /// right.
     scales: [f64; 2],
@@ -334,7 +347,13 @@ struct Sections {
 impl Sections {
     /// `None` where an edge has no point on the surface.
     fn cut(scene: &Scene<'_>, curves: &[Curve; 2]) -> Option<Self> {
-        let mut sections = Self { mean: 0.0, terms: [0.0; 3], oblique: 0.0, scales: [0.0; 2] };
+        let mut sections = Self {
+            mean: 0.0,
+            terms: [0.0; 3],
+            oblique: 0.0,
+            oblique_by_bend: 0.0,
+            scales: [0.0; 2],
+        };
         for (t, weight) in NODES {
             let left = Local::of(scene, &curves[0], t)?;
             let right = Local::of(scene, &curves[1], t)?;
@@ -347,7 +366,9 @@ impl Sections {
             sections.terms[0] += share * width;
             sections.terms[1] += 3.0 * share * width * t;
             sections.terms[2] += 5.0 * share * width * (1.5 * t * t - 0.5);
-            sections.oblique += share * (right.at - left.at).dot(&axis);
+            let oblique = share * (right.at - left.at).dot(&axis);
+            sections.oblique += oblique;
+            sections.oblique_by_bend += 3.0 * t * scene.cosine_squared(curves, t) * oblique;
         }
         sections.measure_scales(scene, curves)?;
         sections.mean.is_finite().then_some(sections)
@@ -423,13 +444,14 @@ impl Spread {
     ) -> (f64, f64) {
         let oblique = sections.oblique * sections.oblique;
         let Some(waves) = scene.waves(curves, sections, memory) else {
-            let tilt = Self::tilt_variance(scene, curves, memory);
+            let [tilt, bend] = Self::tilt_variances(scene, curves, memory);
             let shortened = 0.5 * sections.mean * tilt;
-            return (shortened, oblique * tilt + 2.0 * shortened * shortened);
+            let of_bend = sections.oblique_by_bend * sections.oblique_by_bend * bend;
+            return (shortened, oblique * tilt + of_bend + 2.0 * shortened * shortened);
         };
         let midline = Midline::of(curves);
-        let per_slope = scene.cosine_squared(curves) / (scene.reach() * scene.reach());
-        let first = per_slope * scene.cosine_squared(curves) * waves[0];
+        let per_slope = scene.cosine_squared(curves, 0.0) / (scene.reach() * scene.reach());
+        let first = per_slope * scene.cosine_squared(curves, 0.0) * waves[0];
         // Bends that waves explain are none of the axis.
         let (bends, doubt) = midline.bends_of(&waves);
         let per_bend = 0.5 * sections.mean * per_slope;
@@ -470,19 +492,21 @@ impl Spread {
             .sum()
     }
 
-    /// Variance of the axis' direction \[rad²\]: where lines across the gauge
-    /// run obliquely to the bead, an axis that is off takes them for longer or
-    /// shorter. From how far the middles lie off their course, and over how
-    /// many bands that hangs together.
-    fn tilt_variance(scene: &Scene<'_>, curves: &[Curve; 2], memory: &mut Memory) -> f64 {
+    /// Variances of the axis' direction in the middle \[rad²\] and of its bend in
+    /// halves of the gauge: where lines across the gauge run obliquely to the bead,
+    /// an axis that is off takes them for longer or shorter. From how far the
+    /// middles lie off their course, and over how many bands that hangs together.
+    fn tilt_variances(scene: &Scene<'_>, curves: &[Curve; 2], memory: &mut Memory) -> [f64; 2] {
         let Memory { off: [left, right], values } = memory;
         values.clear();
         let both = left.iter().zip(right.iter());
         values.extend(both.filter_map(|(left, right)| Some(f64::midpoint((*left)?, (*right)?))));
         let per_place = scatter::correlated_variance(values);
         let slope = f64::midpoint(curves[0].slope_variance, curves[1].slope_variance);
-        let cosine = scene.cosine_squared(curves);
-        per_place * slope / (scene.reach() * scene.reach()) * cosine * cosine
+        let bend = f64::midpoint(curves[0].bend_variance, curves[1].bend_variance);
+        let cosine = scene.cosine_squared(curves, 0.0);
+        let per_term = per_place / (scene.reach() * scene.reach());
+        [slope * per_term * cosine * cosine, bend * per_term]
     }
 }
 

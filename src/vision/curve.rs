@@ -12,9 +12,11 @@ const FEW: usize = 3;
 /// A bend is believed from so many standard deviations on.
 const SURE: f64 = 4.0;
 /// Scatter about a parabola that is looked at for more \[px\].
-const NOTABLE_PX: f64 = 0.25;
+pub const NOTABLE_PX: f64 = 0.25;
 /// Part of the scatter's square that more terms must explain.
 const EXPLAINED: f64 = 0.8;
+/// Rounds in which slope and bend in the middle settle beside the higher orders.
+const ARC_PASSES: usize = 3;
 
 /// A point of an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,28 +41,33 @@ pub struct Curve {
     pub mean_variance: f64,
     /// Variance of the second coefficient, the direction, likewise.
     pub slope_variance: f64,
-    /// Variance of the third, the bend.
-    bend_variance: f64,
+    /// Variance of the third, the bend; 0 of a straight line.
+    pub bend_variance: f64,
+    /// Mean square of the points' distances from a parabola \[px²\].
+    pub about_parabola: f64,
 }
 
 impl Curve {
-    /// Fits points; `None` where there are too few or where they lie too close
-    /// together.
-    pub fn fit(points: impl Iterator<Item = Point> + Clone) -> Option<Self> {
+    /// Fits points of a gauge of which half is so long \[px\]; `None` where there
+    /// are too few or where they lie too close together.
+    pub fn fit(points: impl Iterator<Item = Point> + Clone, reach_px: f64) -> Option<Self> {
         let straight = Self::with_terms::<STRAIGHT>(points.clone())?;
         let Some(few) = Self::with_terms::<FEW>(points.clone()) else { return Some(straight) };
         let (off, n) = few.scatter(points.clone());
+        let told = |curve: Self| Some(Self { about_parabola: off, ..curve });
         // An unsure bend would tell wrong places beyond the gauge's ends,
         // where the normals of a slanted bead may cross it.
         if few.terms[2] * few.terms[2] < SURE * SURE * off * few.bend_variance {
-            return Some(straight);
+            return told(straight);
         }
         if off <= NOTABLE_PX * NOTABLE_PX || n < 4.0 * float(MOST) {
-            return Some(few);
+            return told(few.as_arc(reach_px));
         }
-        let Some(more) = Self::with_terms::<MOST>(points.clone()) else { return Some(few) };
+        let Some(more) = Self::with_terms::<MOST>(points.clone()) else {
+            return told(few.as_arc(reach_px));
+        };
         let explained = more.scatter(points).0 < (1.0 - EXPLAINED) * off;
-        Some(if explained { more } else { few })
+        told(if explained { more } else { few.as_arc(reach_px) })
     }
 
     fn with_terms<const N: usize>(points: impl Iterator<Item = Point>) -> Option<Self> {
@@ -84,7 +91,34 @@ impl Curve {
         let sound = terms.iter().all(|term| term.is_finite());
         let (mean_variance, slope_variance) = (inverse[(0, 0)], inverse[(1, 1)]);
         let bend_variance = if N > 2 { inverse[(N.min(3) - 1, N.min(3) - 1)] } else { 0.0 };
-        sound.then_some(Self { terms, count: N, mean_variance, slope_variance, bend_variance })
+        sound.then_some(Self {
+            terms,
+            count: N,
+            mean_variance,
+            slope_variance,
+            bend_variance,
+            about_parabola: 0.0,
+        })
+    }
+
+    /// A parabola, and what the arc with its slope and bend in the middle has of
+    /// the third and fourth order: u‴ = 3u′u″²/(1 + u′²) and
+    /// u⁗ = 3u″³(1 + 5u′²)/(1 + u′²)². A bead that is evenly bent runs along an
+    /// arc, and where its axis is off by these, widths are taken obliquely.
+    fn as_arc(mut self, reach_px: f64) -> Self {
+        for _ in 0..ARC_PASSES {
+            let (slope, bend) = (self.slope(0.0), self.bend(0.0));
+            let tangent = slope / reach_px;
+            let length = 1.0 + tangent * tangent;
+            let per_px = bend / reach_px;
+            let third = 3.0 * tangent * bend * per_px / length;
+            let bent = 1.0 + 5.0 * tangent * tangent;
+            let fourth = 3.0 * bend * per_px * per_px * bent / (length * length);
+            // t³ is ⅖P₃ and t⁴ is 8/35 P₄, beside lower orders that were fitted.
+            self.terms[3] = 0.4 * third / 6.0;
+            self.terms[4] = 8.0 / 35.0 * fourth / 24.0;
+        }
+        self
     }
 
     /// Its Legendre coefficient of an order \[px\]; 0 of those that it does not
@@ -148,7 +182,7 @@ mod tests {
         let of = |t: f64| 100.0 + 8.0 * t - 3.0 * t * t;
         let mut points = points(of);
         points.drain(10..22);
-        let curve = Curve::fit(points.iter().copied()).unwrap();
+        let curve = Curve::fit(points.iter().copied(), 1e9).unwrap();
         for t in [-1.0, -0.3, 0.0, 0.9] {
             assert!((curve.at(t) - of(t)).abs() < 1e-9);
             assert!((curve.slope(t) - (8.0 - 6.0 * t)).abs() < 1e-8);
@@ -159,14 +193,32 @@ mod tests {
     #[test]
     fn what_bends_more_is_followed_when_that_explains_it() {
         let of = |t: f64| 100.0 + 6.0 * (t * t * t - t) + 4.0 * t.powi(4);
-        let curve = Curve::fit(points(of).into_iter()).unwrap();
+        let curve = Curve::fit(points(of).into_iter(), 1e9).unwrap();
         assert!((curve.at(0.4) - of(0.4)).abs() < 1e-9);
         let slope = (curve.at(0.4 + 1e-5) - curve.at(0.4 - 1e-5)) / 2e-5;
         assert!((curve.slope(0.4) - slope).abs() < 1e-6);
     }
 
     #[test]
+    fn an_arc_is_followed_where_a_parabola_is_off() {
+        let (radius, reach) = (300.0, 85.0);
+        for degrees in [0.0f64, 10.0] {
+            let (sine, cosine) = degrees.to_radians().sin_cos();
+            let of = |t: f64| {
+                radius * cosine - (radius * radius - (radius * sine + t * reach).powi(2)).sqrt()
+            };
+            let curve = Curve::fit(points(of).into_iter(), reach).unwrap();
+            let parabola = Curve::fit(points(of).into_iter(), 1e9).unwrap();
+            let off = |curve: &Curve| {
+                let off = |t: f64| (curve.at(t) - of(t)).abs();
+                points(off).iter().fold(0.0, |most: f64, point| most.max(point.u))
+            };
+            assert!(off(&curve) < 0.15 * off(&parabola), "{} {}", off(&curve), off(&parabola));
+        }
+    }
+
+    #[test]
     fn one_point_is_no_curve() {
-        assert_eq!(Curve::fit(points(|t| t).into_iter().take(1)), None);
+        assert_eq!(Curve::fit(points(|t| t).into_iter().take(1), 1e9), None);
     }
 }
