@@ -2,7 +2,9 @@
 //! blur, edge detector and line finder, which the 2022 paper's method needs.
 //!
 //! After divan's own listing the three are compared in one run and one thread,
-//! by turns, each call on the next frame of a ring that no L2 cache holds.
+//! by turns, each call on the next frame of a ring that no L2 cache holds. So is a
+//! loop that counts and touches no memory: how rarely it is slow tells what the
+//! machine itself adds to the rarest times of the others.
 
 #![expect(clippy::expect_used, reason = "a benchmark of sound input")]
 
@@ -28,6 +30,8 @@ const ROUNDS: usize = 20_000;
 const ROUNDS_OF_LINES: usize = 20;
 /// Rounds with the same frame; one in ten has OpenCV, too.
 const HOT_ROUNDS: usize = 3000;
+/// Turns of the loop that only counts, about as long as a measurement.
+const TURNS: u32 = 60_000;
 /// Those of the paper's method in a gauge of 500 rows.
 const LINES: EdgeSettings = EdgeSettings {
     blur_sigma_px: 1.5,
@@ -163,7 +167,16 @@ impl<'a> Contest<'a> {
         })
     }
 
-    /// Measurement and copy by turns, and now and then OpenCV, after which the
+    /// Counts: the same work in each round, for registers alone.
+    fn count(&self) -> f64 {
+        let start = self.next;
+        clocked(|| {
+            let step = |value: u64, turn: u32| black_box(value.wrapping_mul(3) + u64::from(turn));
+            black_box((0..TURNS).fold(start as u64, step));
+        })
+    }
+
+    /// Measurement, copy and count by turns, and now and then OpenCV, after which the
     /// other two are called once without the clock: neither pays for the
     /// caches that it has filled.
     fn run(&mut self, rounds: usize, rounds_of_lines: usize) -> Times {
@@ -176,9 +189,10 @@ impl<'a> Contest<'a> {
             }
             times.measure.push(self.measure());
             times.copy.push(self.copy());
+            times.count.push(self.count());
         }
-        let Times { measure, copy, lines } = &mut times;
-        for list in [measure, copy, lines] {
+        let Times { measure, copy, lines, count } = &mut times;
+        for list in [measure, copy, lines, count] {
             list.sort_by(f64::total_cmp);
         }
         times
@@ -198,6 +212,7 @@ struct Times {
     measure: Vec<f64>,
     copy: Vec<f64>,
     lines: Vec<f64>,
+    count: Vec<f64>,
 }
 
 impl Times {
@@ -219,13 +234,18 @@ fn rare(sorted: &[f64]) -> f64 {
 
 fn report(times: &Times) {
     println!("              calls    median us   p99.9 us");
-    let rows =
-        [("measure", &times.measure), ("memcpy", &times.copy), ("canny_hough", &times.lines)];
+    let rows = [
+        ("measure", &times.measure),
+        ("memcpy", &times.copy),
+        ("canny_hough", &times.lines),
+        ("counting", &times.count),
+    ];
     for (name, list) in rows {
         println!("{name:12} {:6} {:12.2} {:10.2}", list.len(), median(list), rare(list));
     }
-    let measure = &times.measure;
-    println!("measure p99.9/median = {:.2}", rare(measure) / median(measure));
+    let spread = |list: &[f64]| rare(list) / median(list);
+    let (measure, count) = (spread(&times.measure), spread(&times.count));
+    println!("measure p99.9/median = {measure:.2}; of counting alone {count:.2}");
 }
 
 fn main() {

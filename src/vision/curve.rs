@@ -51,54 +51,23 @@ impl Curve {
     /// Fits points of a gauge of which half is so long \[px\]; `None` where there
     /// are too few or where they lie too close together.
     pub fn fit(points: impl Iterator<Item = Point> + Clone, reach_px: f64) -> Option<Self> {
-        let straight = Self::with_terms::<STRAIGHT>(points.clone())?;
-        let Some(few) = Self::with_terms::<FEW>(points.clone()) else { return Some(straight) };
-        let (off, n) = few.scatter(points.clone());
+        let sums = Sums::<FEW>::of(points.clone());
+        let (straight, _) = sums.curve::<STRAIGHT>()?;
+        let Some((few, off)) = sums.curve::<FEW>() else { return Some(straight) };
         let told = |curve: Self| Some(Self { about_parabola: off, ..curve });
         // An unsure bend would tell wrong places beyond the gauge's ends,
         // where the normals of a slanted bead may cross it.
         if few.terms[2] * few.terms[2] < SURE * SURE * off * few.bend_variance {
             return told(straight);
         }
-        if off <= NOTABLE_PX * NOTABLE_PX || n < 4.0 * float(MOST) {
-            return told(few.as_arc(reach_px));
+        if off > NOTABLE_PX * NOTABLE_PX
+            && sums.weight >= 4.0 * float(MOST)
+            && let Some((more, rest)) = Sums::<MOST>::of(points).curve::<MOST>()
+            && rest < (1.0 - EXPLAINED) * off
+        {
+            return told(more);
         }
-        let Some(more) = Self::with_terms::<MOST>(points.clone()) else {
-            return told(few.as_arc(reach_px));
-        };
-        let explained = more.scatter(points).0 < (1.0 - EXPLAINED) * off;
-        told(if explained { more } else { few.as_arc(reach_px) })
-    }
-
-    fn with_terms<const N: usize>(points: impl Iterator<Item = Point>) -> Option<Self> {
-        let mut matrix = SMatrix::<f64, N, N>::zeros();
-        let mut vector = SVector::<f64, N>::zeros();
-        for point in points {
-            let values = legendre(point.t);
-            for i in 0..N {
-                let weighted = point.weight * values[i];
-                vector[i] += weighted * point.u;
-                for j in 0..=i {
-                    matrix[(i, j)] += weighted * values[j];
-                }
-            }
-        }
-        matrix.fill_upper_triangle_with_lower_triangle();
-        let inverse = matrix.cholesky()?.inverse();
-        let found = inverse * vector;
-        let mut terms = [0.0; MOST];
-        terms[..N].copy_from_slice(found.as_slice());
-        let sound = terms.iter().all(|term| term.is_finite());
-        let (mean_variance, slope_variance) = (inverse[(0, 0)], inverse[(1, 1)]);
-        let bend_variance = if N > 2 { inverse[(N.min(3) - 1, N.min(3) - 1)] } else { 0.0 };
-        sound.then_some(Self {
-            terms,
-            count: N,
-            mean_variance,
-            slope_variance,
-            bend_variance,
-            about_parabola: 0.0,
-        })
+        told(few.as_arc(reach_px))
     }
 
     /// A parabola, and what the arc with its slope and bend in the middle has of
@@ -148,16 +117,64 @@ impl Curve {
         let [_, _, c, d, e] = self.terms;
         3.0 * c + 15.0 * d * t + 7.5 * e * (7.0 * t * t - 1.0)
     }
+}
 
-    /// Mean square of the points' distance, and the weight of the points.
-    fn scatter(&self, points: impl Iterator<Item = Point>) -> (f64, f64) {
-        let (mut sum, mut n) = (0.0, 0.0);
+/// Sums over points for curves of up to so many terms.
+struct Sums<const N: usize> {
+    matrix: SMatrix<f64, N, N>,
+    vector: SVector<f64, N>,
+    square: f64,
+    weight: f64,
+    /// Position that all others are taken from \[px\].
+    from: f64,
+}
+
+impl<const N: usize> Sums<N> {
+    fn of(points: impl Iterator<Item = Point>) -> Self {
+        let mut points = points.peekable();
+        let from = points.peek().map_or(0.0, |point| point.u);
+        let (matrix, vector) = (SMatrix::zeros(), SVector::zeros());
+        let mut sums = Self { matrix, vector, square: 0.0, weight: 0.0, from };
         for point in points {
-            let off = point.u - self.at(point.t);
-            sum += point.weight * off * off;
-            n += point.weight;
+            let (values, u) = (legendre(point.t), point.u - from);
+            sums.weight += point.weight;
+            sums.square += point.weight * u * u;
+            for i in 0..N {
+                let weighted = point.weight * values[i];
+                sums.vector[i] += weighted * u;
+                for j in 0..=i {
+                    sums.matrix[(i, j)] += weighted * values[j];
+                }
+            }
         }
-        (sum / f64::max(n, 1e-9), n)
+        sums.matrix.fill_upper_triangle_with_lower_triangle();
+        sums
+    }
+
+    /// The curve of the first `M` terms and the mean square of the points'
+    /// distances from it \[px²\].
+    fn curve<const M: usize>(&self) -> Option<(Curve, f64)> {
+        let matrix = self.matrix.fixed_view::<M, M>(0, 0).into_owned();
+        let vector = self.vector.fixed_rows::<M>(0).into_owned();
+        let inverse = matrix.cholesky()?.inverse();
+        let found = inverse * vector;
+        let mut terms = [0.0; MOST];
+        terms[..M].copy_from_slice(found.as_slice());
+        terms[0] += self.from;
+        if !terms.iter().all(|term| term.is_finite()) {
+            return None;
+        }
+        let variance = |k: usize| if k < M { inverse[(k, k)] } else { 0.0 };
+        let curve = Curve {
+            terms,
+            count: M,
+            mean_variance: variance(0),
+            slope_variance: variance(1),
+            bend_variance: variance(2),
+            about_parabola: 0.0,
+        };
+        let rest = (self.square - found.dot(&vector)).max(0.0);
+        Some((curve, rest / self.weight.max(1e-9)))
     }
 }
 

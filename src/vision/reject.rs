@@ -52,7 +52,7 @@ pub enum Reject {
     },
     /// The bead bends too sharply for a width normal to its axis: a corner.
     Corner {
-        /// Radius of its axis, in its widths.
+        /// Radius of its axis, in its widths; 0 where it turns at once.
         got_widths: f64,
         /// Smallest radius that is measured, in widths.
         least_widths: f64,
@@ -140,6 +140,10 @@ impl fmt::Display for Reject {
                 "edges at {:.0} degrees to the gauge's axis, measured are up to {:.0}",
                 got_rad.to_degrees(),
                 limit_rad.to_degrees()
+            ),
+            Self::Corner { got_widths, least_widths } if *got_widths <= 0.0 => write!(
+                f,
+                "the bead turns a corner within the gauge, measured are bends with a radius of {least_widths:.1} widths or more"
             ),
             Self::Corner { got_widths, least_widths } => write!(
                 f,
