@@ -142,8 +142,8 @@ impl<const N: usize> Sums<N> {
             for i in 0..N {
                 let weighted = point.weight * values[i];
                 sums.vector[i] += weighted * u;
-                for j in 0..=i {
-                    sums.matrix[(i, j)] += weighted * values[j];
+                for (j, value) in values.iter().take(i + 1).enumerate() {
+                    sums.matrix[(i, j)] += weighted * value;
                 }
             }
         }
