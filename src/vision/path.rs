@@ -128,7 +128,8 @@ pub fn smooth(values: &[f32], out: &mut Vec<f32>) {
 }
 
 /// The same for values that follow a parabola, which is left as it is where it is
-/// notable: the line through the neighbours of a bent edge runs inside it.
+/// notable: the line through the neighbours of a bent edge runs inside it. The values
+/// are scratch afterwards.
 pub fn smooth_bent(values: &mut [f32], out: &mut Vec<f32>) {
     let middle = 0.5 * (signed(values.len()) - 1.0);
     let square = |band: usize| (signed(band) - middle) * (signed(band) - middle);

@@ -46,8 +46,8 @@ impl Tracer {
         self.groups.clear();
         self.plain.clear();
         self.plain.resize(scene.lines.len(), PlainSums::default());
-        // Rows of a window and the noise of a pixel in it.
-        let mut of = (0.0, 0.0);
+        // Noise of a pixel in the mean of so many rows.
+        let (mut rows, mut noise) = (0.0, 0.0);
         for (number, window) in self.sheet.windows().iter().enumerate() {
             let (band, weight) = (window.line, window.rows);
             if self.clear.get(number) == Some(&false) {
@@ -55,10 +55,10 @@ impl Tracer {
                 continue;
             }
             let [path, _, step] = window.expected;
-            if (weight - of.0).abs() > 0.0 {
-                of = (weight, self.pixel_variance(scene, weight).sqrt());
+            if (weight - rows).abs() > 0.0 {
+                (rows, noise) = (weight, self.pixel_variance(scene, weight).sqrt());
             }
-            let expected = Self::expected(window.expected, of.1);
+            let expected = Self::expected(window.expected, noise);
             let pixels = (self.sheet.pixels(number).as_slice(), window.first);
             let sums = self.template.hold(pixels, &expected, &mut self.plain[band]);
             let sums = sums.unwrap_or(RowSums::OUT_OF_SIGHT);
