@@ -114,9 +114,7 @@ impl Profile {
     /// Each sample's distance from the path and its value, from a distance to
     /// another \[px\].
     pub fn samples(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
-        let first = index((from + self.shift).ceil());
-        let last = index((to + self.shift).floor() + 1.0);
-        (first..last).map(|k| (place(k) - self.shift, f64::from(self.mean[k])))
+        samples(&self.mean, self.shift, (from, to))
     }
 }
 
@@ -324,11 +322,22 @@ impl Mean<'_> {
     /// another \[px\].
     #[inline(always)]
     fn samples(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
-        let first = index((from + self.shift).ceil());
-        let last = index((to + self.shift).floor() + 1.0).max(first);
-        let samples = (first..last).zip(&self.samples[first..last]);
-        samples.map(|(k, value)| (place(k) - self.shift, f64::from(*value)))
+        samples(self.samples, self.shift, (from, to))
     }
+}
+
+/// Each sample's distance from the path and its value, from a distance to another
+/// \[px\], where the path lies so far from the middle sample.
+#[inline(always)]
+fn samples(
+    values: &[f32; SPAN],
+    shift: f64,
+    (from, to): (f64, f64),
+) -> impl Iterator<Item = (f64, f64)> {
+    let first = index((from + shift).ceil());
+    let last = index((to + shift).floor() + 1.0).max(first);
+    let samples = (first..last).zip(&values[first..last]);
+    samples.map(move |(k, value)| (place(k) - shift, f64::from(*value)))
 }
 
 /// Number of the value that a share of all do not exceed.
