@@ -429,7 +429,7 @@ impl Spread {
             noise += scale * per_place * inflation;
         }
         let roughness = Self::roughness(scene, sections, memory, noise);
-        variance += Self::hidden(scene, roughness);
+        variance += Self::hidden(scene, sections, roughness, memory);
         let (shortened, of_tilt) = Self::tilted(scene, curves, sections, memory);
         Self { sigma: (variance + of_tilt).sqrt(), shortened, roughness }
     }
@@ -453,15 +453,18 @@ impl Spread {
         let per_slope = scene.cosine_squared(curves, 0.0) / (scene.reach() * scene.reach());
         let first = per_slope * scene.cosine_squared(curves, 0.0) * waves[0];
         // Bends that waves explain are none of the axis.
-        let (bends, doubt) = midline.bends_of(&waves);
+        let bends = midline.bends_of(&waves);
         let per_bend = 0.5 * sections.mean * per_slope;
         // Waves make a slope of their own; only what is beyond them is that of
         // an axis, along which an error of the direction counts.
         let beyond = (oblique - OBLIQUE * sections.mean * sections.mean * first).max(0.0);
         let of_slope = 0.5 * sections.mean * first;
-        let of_bends = per_bend * doubt;
-        let variance = beyond * first + of_slope * of_slope + of_bends * of_bends;
-        (of_slope + per_bend * bends, variance)
+        let of_bends = per_bend * bends.doubt;
+        // Along a bent bead the waves' bend is an error of the direction as well.
+        let by_bend = sections.oblique_by_bend / scene.reach();
+        let of_axis = beyond * first + bends.is_bent * by_bend * by_bend * waves[1];
+        let variance = of_axis + of_slope * of_slope + of_bends * of_bends;
+        (of_slope + per_bend * bends.of_waves, variance)
     }
 
     /// Standard deviation of the width along the gauge, without the noise of
@@ -478,18 +481,23 @@ impl Spread {
         (square / f64::max(n - 1.0, 1.0) - noise).max(0.0).sqrt()
     }
 
-    /// The bands that are missing hide bead that counts; its waviness is an
-    /// error then. Each edge has half of it.
-    fn hidden(scene: &Scene<'_>, roughness: f64) -> f64 {
-        scene
-            .sides
-            .iter()
-            .map(|side| {
-                let all = float(side.places.len());
-                let seen: f64 = side.places.iter().flatten().map(|located| located.share).sum();
-                0.5 * roughness * roughness * (1.0 - seen / all).max(0.0) / f64::max(seen, 1.0)
-            })
-            .sum()
+    /// The bands that are missing hide bead that counts; its waviness is an error then,
+    /// which hangs together over neighbouring bands. Each edge has half of it.
+    fn hidden(scene: &Scene<'_>, sections: &Sections, roughness: f64, memory: &mut Memory) -> f64 {
+        let mut variance = 0.0;
+        for (number, side) in scene.sides.iter().enumerate() {
+            let seen: f64 = side.places.iter().flatten().map(|located| located.share).sum();
+            let missing = 1.0 - seen / float(side.places.len());
+            if missing > 0.0 {
+                memory.values.clear();
+                memory.values.extend(memory.off[number].iter().flatten());
+                let waves = scatter::correlated_variance(&memory.values);
+                let waves = (waves - mean_variance(side.places)).max(0.0);
+                let waves = waves * sections.scales[number] * sections.scales[number];
+                variance += waves.max(0.5 * roughness * roughness) * missing / seen.max(1.0);
+            }
+        }
+        variance
     }
 
     /// Variances of the axis' direction in the middle \[rad²\] and of its bend in

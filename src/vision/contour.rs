@@ -20,6 +20,8 @@ const BREAK_COST: f32 = 1.0;
 /// Slope against the gauge's axis up to which edges run freely; a bead that
 /// slants 20 degrees and bulges by another 15 stays below.
 const FREE_SLOPE: f32 = 0.7;
+/// Height of a band within which no bead's edge runs far \[px\].
+const LOW_BAND_PX: f32 = 4.0;
 /// Marks the first step of a contour.
 const NONE: u16 = u16::MAX;
 
@@ -32,8 +34,9 @@ pub struct Contour {
     pub step: f32,
     /// Share of the bands in which it has a step.
     pub share: f64,
-    /// How far a step lies off the line between its neighbours, median \[px\]:
-    /// little for an edge, much for sparks that happen to lie in a row.
+    /// How far a step lies off the line between its neighbours, median \[px\], as if
+    /// of bands of no more than [`LOW_BAND_PX`]: little for an edge, also for a rough
+    /// one, much for sparks that happen to lie in a row.
     pub wobble: f32,
 }
 
@@ -71,7 +74,9 @@ impl Contours {
             }
             let Some(last) = self.link(bands.len(), &steps, band_px, typical) else { return };
             self.follow(last, &steps);
-            if self.found[self.count].share < least_share {
+            let found = &mut self.found[self.count];
+            found.wobble *= (LOW_BAND_PX / band_px).min(1.0);
+            if found.share < least_share {
                 return;
             }
             self.count += 1;
@@ -206,6 +211,20 @@ mod tests {
         let mut contours = Contours::default();
         contours.search(bands, true, 4.0, 0.4);
         contours
+    }
+
+    #[test]
+    fn a_rough_edge_in_tall_bands_does_not_wobble_more_than_sparks_in_low_ones() {
+        let edge = |band: u8| Candidate { at: 50.0 + f32::from(band * 7 % 3), step: 20.0 };
+        let bands: Vec<Candidates> =
+            (0..20).map(|band| Candidates::of([edge(band)].into_iter())).collect();
+        let wobble = |band_px: f32| {
+            let mut contours = Contours::default();
+            contours.search(&bands, true, band_px, 0.4);
+            contours.all()[0].wobble
+        };
+        assert_eq!(wobble(4.0), 1.5);
+        assert_eq!(wobble(20.0), 0.3);
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod hidden;
 mod levels;
 mod rows;
 mod uncover;
+mod winding;
 
 use super::cut_off::CutOff;
 use super::number::{float, narrow};
@@ -96,6 +97,12 @@ pub struct Tracer {
     before: Vec<f32>,
     step: Vec<f32>,
     course: Course,
+    /// A course along bands with levels that were picked anew.
+    levels: Course,
+    /// Whether the course was picked from line to line.
+    winds: bool,
+    /// Whether it should have been, from how the bands lie.
+    seems_winding: bool,
     groups: Vec<rows::Group>,
     sheet: Sheet,
     overlay: Overlay,
@@ -128,6 +135,8 @@ pub struct Tracer {
     /// What a row in the median leaves of the step that it is held against, in
     /// standard deviations of its noise; about 1 where the edge is one.
     pub misfit: f64,
+    /// Rows that were held together at most.
+    together: f64,
     /// Blur of the edge \[px\].
     pub blur_px: f64,
     /// Variance of the whole edge's position that all places share, from
@@ -169,6 +178,18 @@ impl Tracer {
         matches!(self.state, State::Unseen | State::Hidden)
     }
 
+    /// The misfit as if rows had been held one by one: what is no blurred step shows
+    /// the more, the more rows are taken together.
+    pub fn misfit_of_a_row(&self) -> f64 {
+        let beyond = (self.misfit * self.misfit - 1.0) / self.together.max(1.0);
+        (1.0 + beyond.max(0.0)).sqrt()
+    }
+
+    /// Whether the edge winds more quickly than bands show it, as far as they tell.
+    pub fn seems_winding(&self) -> bool {
+        self.seems_winding
+    }
+
     /// Whether nothing covers the edge, or its clear rows are known.
     pub fn is_clear(&self) -> bool {
         matches!(self.state, State::Open | State::Covered) && self.misfit < GOOD_FIT
@@ -194,12 +215,20 @@ impl Tracer {
         self.state = State::Unseen;
         self.misfit = f64::INFINITY;
         self.sort_rows = false;
+        self.winds = false;
         self.clear.clear();
         self.picked.clear();
         self.picked.extend(rough.map(|at| at.unwrap_or(f32::NAN)));
         if !self.take_picked(scene) {
             return None;
         }
+        self.follow_windings(scene);
+        self.lay_over(table, scene)
+    }
+
+    /// Lays the rows over each other along the course and looks at what they show.
+    #[inline(always)]
+    fn lay_over<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> Option<(f64, f64)> {
         self.read(scene);
         self.overlay.lay(&self.sheet);
         let noise = f64::from(scene.noise) / f64::from(typical(&self.step).abs());
@@ -234,7 +263,8 @@ impl Tracer {
     #[inline(always)]
     pub fn trace<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>, blur: (f64, f64)) {
         let found = self.trace_open(table, scene, blur);
-        if found && self.unfit <= COVERED_SHARE {
+        let is_open = found && self.unfit <= COVERED_SHARE && !self.lost_lines(scene);
+        if is_open || self.trace_winding(table, scene) {
             self.state = State::Open;
         } else if self.uncover(table, scene) {
             self.state = State::Covered;
@@ -393,10 +423,9 @@ impl Tracer {
     /// Draws the path anew through the edges that were found.
     #[inline(always)]
     fn redraw<T: Grey>(&mut self, scene: &Scene<'_, T>) {
-        let places = self.edges.iter().map(|edge| edge.map(|edge| narrow(edge.at)));
-        path::fill(places, &mut self.rough);
+        self.fill_from_edges(scene);
         path::median_of_three(&mut self.rough);
-        if self.texture.is_some() {
+        if self.texture.is_some() && !self.winds {
             // What the texture makes of a place is no path.
             path::smooth(&self.rough, &mut self.sorted);
             std::mem::swap(&mut self.rough, &mut self.sorted);

@@ -29,10 +29,10 @@ const SMALL_FIRST: f64 = 0.35;
 const POINTS: usize = 40;
 /// Evidence that is believed, in standard deviations of what noise makes.
 const BELIEVED: f64 = 4.0;
-/// Standard deviations of what waves make from which on a bend is one of the
-/// bead, and from which on it may be one.
-const SURE_BEND: f64 = 6.0;
-const LIKELY_BEND: f64 = 2.5;
+/// Degrees of freedom of the waves' variance.
+const FREEDOM: f64 = 10.0;
+/// How likely a bent bead is to show a coefficient, in the density of waves at none.
+const BENT: f64 = 0.02;
 
 /// Coefficients that tell of waves, by their order.
 #[derive(Debug, Clone, Copy, Default)]
@@ -104,6 +104,17 @@ impl Evidence {
 #[derive(Debug, Clone, Copy)]
 pub struct Midline([f64; CURVED]);
 
+/// What of a midline's bends is waves.
+#[derive(Debug, Clone, Copy)]
+pub struct Bends {
+    /// Mean square of the slope that waves make \[px²\].
+    pub of_waves: f64,
+    /// Standard deviation of that \[px²\].
+    pub doubt: f64,
+    /// How likely the bead itself is evenly bent.
+    pub is_bent: f64,
+}
+
 impl Midline {
     /// Of a left and a right edge.
     pub fn of([left, right]: &[Curve; 2]) -> Self {
@@ -121,24 +132,30 @@ impl Midline {
     /// Mean square of the slope that comes from bends, as far as waves of these
     /// variances explain them, and the doubt that leaves where a bead that is
     /// bent could explain them as well.
-    pub fn bends_of(&self, waves: &[f64; CURVED]) -> (f64, f64) {
-        let beyond = |k: usize, many: f64| self.0[k] * self.0[k] > many * many * waves[k];
+    pub fn bends_of(&self, waves: &[f64; CURVED]) -> Bends {
         let mut axis = *self;
-        let mut believed = 0.0;
-        if beyond(2, SURE_BEND) || beyond(3, SURE_BEND) {
-            believed += 6.0 * waves[2] + 10.0 * waves[3];
-        } else {
-            (axis.0[2], axis.0[3]) = (0.0, 0.0);
+        let (mut believed, mut doubt) = (0.0, 0.0);
+        let mut is_bent = [0.0; CURVED];
+        for (k, in_square) in [(1, 3.0), (2, 6.0), (3, 10.0)] {
+            let square = self.0[k] * self.0[k];
+            let waves_alone = likelihood_of_waves(square / waves[k].max(f64::MIN_POSITIVE));
+            let bent = 1.0 - waves_alone;
+            axis.0[k] *= bent.sqrt();
+            is_bent[k] = bent;
+            believed += in_square * bent * waves[k];
+            doubt += waves_alone * bent * (in_square * square).powi(2);
         }
-        if beyond(1, SURE_BEND) {
-            believed += 3.0 * waves[1];
-        } else {
-            axis.0[1] = 0.0;
-        }
-        let bends = self.square() - axis.square() + believed;
-        let doubtful = (1..CURVED).any(|k| beyond(k, LIKELY_BEND));
-        (bends, if doubtful { 0.5 * bends } else { 0.0 })
+        let of_waves = self.square() - axis.square() + believed;
+        Bends { of_waves, doubt: doubt.sqrt(), is_bent: is_bent[1] }
     }
+}
+
+/// How likely it is that waves alone make a coefficient, by its square in their
+/// variance, which is estimated from a dozen coefficients: Student's density, beside
+/// that of a bead that is bent by any amount.
+fn likelihood_of_waves(square: f64) -> f64 {
+    let waves = (1.0 + square / FREEDOM).powf(-0.5 * (FREEDOM + 1.0));
+    waves / (waves + BENT)
 }
 
 /// Variance of each coefficient for waves of variance 1, for each length: their
@@ -198,6 +215,15 @@ mod tests {
         let values = legendre(0.3);
         assert!((values[1] - (1.5 * 0.09 - 0.5)).abs() < 1e-12);
         assert!((values[3] - (35.0 * 0.0081 - 30.0 * 0.09 + 3.0) / 8.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_bend_is_waves_the_less_the_more_it_exceeds_them() {
+        let of = |bend: f64| Midline([0.0, bend, 0.0, 0.0]).bends_of(&[1.0; CURVED]);
+        let (small, unsure, large) = (of(1.0), of(4.0), of(12.0));
+        assert!(small.is_bent < 0.06 && (small.of_waves / 3.0 - 1.0).abs() < 0.15, "{small:?}");
+        assert!(unsure.doubt > 0.3 * 3.0 * 16.0, "{unsure:?}");
+        assert!(large.is_bent > 0.98 && large.of_waves < 0.05 * 3.0 * 144.0, "{large:?}");
     }
 
     #[test]

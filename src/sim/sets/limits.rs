@@ -69,6 +69,14 @@ impl Limits {
         measured_share: Some(0.99),
         ..Self::CORNER
     };
+    /// A rough bead, every row of which shows.
+    pub const ROUGH: Self = Self {
+        bias_px: Some(0.02),
+        rmse_px: Some(0.05),
+        measured_share: Some(0.99),
+        silent_share: Some(1e-4),
+        ..Self::TRUST
+    };
     /// A curve of three widths or more.
     pub const CURVE: Self = Self { bias_px: Some(0.02), measured_share: Some(0.99), ..NONE };
     /// A corner: it may be refused, and may be uncertain, but not be wrong.

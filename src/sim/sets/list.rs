@@ -15,7 +15,7 @@ const PLAIN: Picture = Picture { light_ratio: 1.0, ..Picture::USUAL };
 
 /// All sets, in the order in which they are reported.
 pub fn all() -> Vec<Set> {
-    [clean(), slanted(), other(), lit(), covered(), beside(), odd(), bends()].concat()
+    [clean(), slanted(), other(), lit(), covered(), beside(), odd(), rough(), bends()].concat()
 }
 
 pub(super) fn plain(name: &'static str) -> Set {
@@ -153,6 +153,30 @@ fn odd() -> Vec<Set> {
             picture.motion = Motion { length_px: 6.0, direction_deg: 15.0 };
         }),
         Set { rows: 400, ..layer },
+    ]
+}
+
+/// Rough beads in tall gauges, alone and with what disturbs.
+fn rough() -> Vec<Set> {
+    let tall = |set: Set, size_mm: f64, length_mm: f64| Set {
+        rows: 500,
+        roughness: Roughness { size_mm, length_mm },
+        ..set
+    };
+    let disturbed = |name, disturb: &dyn Fn(&mut Picture)| tall(disturbed(name, disturb), 0.2, 4.0);
+    let shadow = |share: f64| {
+        let shadow = Shadow { distance_px: 10.0, width_px: 20.0, share, side: Side::Left };
+        move |picture: &mut Picture| picture.shadow = shadow
+    };
+    let slanted = slant("rough-tall-slant-15", 15.0, 1.5);
+    vec![
+        Set { limits: Limits::ROUGH, ..tall(plain("rough-tall"), 0.38, 3.16) },
+        Set { limits: Limits::DISTURBED, ..tall(slanted, 0.2, 4.0) },
+        disturbed("rough-tall-shadow", &shadow(0.7)),
+        disturbed("rough-tall-band", &shadow(-0.5)),
+        disturbed("rough-tall-saturated", &|picture| {
+            (picture.bead_grey, picture.ground_grey) = (265.0, 200.0);
+        }),
     ]
 }
 

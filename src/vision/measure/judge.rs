@@ -21,6 +21,9 @@ const VERY_STRANGE: f64 = 8.0;
 /// Largest standard deviation of a width whose edges are covered in part
 /// \[px\]: beyond it, what is left of an edge does not tell its course.
 const COVERED_SIGMA_PX: f64 = 0.19;
+/// The same where a covered edge seems to wind: what winds aside looks covered as
+/// well, so that too little is left of such an edge.
+const WINDING_SIGMA_PX: f64 = 0.05;
 /// Share of clear rows from which on an edge's course is sure enough.
 const PLENTY_CLEAR: f64 = 0.6;
 /// Distance from the border of the gauge that an edge needs, in its blurs and at
@@ -32,6 +35,10 @@ const NEARER: f64 = 0.05;
 /// Largest scatter of neighbouring edges about each other \[px\] that still is
 /// an edge, not noise.
 const MAX_SCATTER_PX: f64 = 1.5;
+/// The same where both edges show in all rows but for a few sparks: then they are
+/// as rough as they look.
+const WHOLE_SCATTER_PX: f64 = 4.0;
+const WHOLE_SHARE: f64 = 0.95;
 /// The same where one edge was hidden and had to be located line by line.
 const LOST_SCATTER_PX: f64 = 0.5;
 
@@ -39,7 +46,7 @@ impl Work {
     /// Whether one edge alone is hidden: then it is covered, not of another kind
     /// than the other one.
     pub(super) fn one_is_lost(&self) -> bool {
-        let lost = |side: &Tracer| side.is_hidden() && side.misfit > STRANGE;
+        let lost = |side: &Tracer| side.is_hidden() && side.misfit_of_a_row() > STRANGE;
         lost(&self.left) != lost(&self.right)
     }
 
@@ -56,7 +63,7 @@ impl Work {
         let got = self.left.used_share().min(self.right.used_share());
         let enough =
             [&self.left, &self.right].iter().all(|side| side.used_share() >= need_of(side));
-        let limit = if self.is_lost { LOST_SCATTER_PX } else { MAX_SCATTER_PX };
+        let limit = self.scatter_limit();
         if worst > limit {
             return Err(Reject::Unsure { got_px: worst, limit_px: limit });
         }
@@ -65,6 +72,19 @@ impl Work {
             return Err(Reject::NoPair { got, need });
         }
         Ok(())
+    }
+
+    /// Scatter of an edge from which on it is noise \[px\].
+    fn scatter_limit(&self) -> f64 {
+        let sides = [&self.left, &self.right];
+        let whole = |side: &&Tracer| side.is_clear() && side.used_share() > WHOLE_SHARE;
+        if self.is_lost {
+            LOST_SCATTER_PX
+        } else if sides.iter().all(whole) {
+            WHOLE_SCATTER_PX
+        } else {
+            MAX_SCATTER_PX
+        }
     }
 
     pub(super) fn check_contrast(&mut self) -> Result<(), Reject> {
@@ -89,10 +109,16 @@ impl Work {
     /// run.
     pub(super) fn check_covered(&self, found: &WidthMeasurement) -> Result<(), Reject> {
         let got_px = found.sigma.get() / found.width.get() * f64::from(self.width_px);
-        let sparse = |side: &Tracer| side.is_covered() && side.used_share() < PLENTY_CLEAR;
-        let unsure = sparse(&self.left) || sparse(&self.right);
-        if unsure && got_px > COVERED_SIGMA_PX {
-            return Err(Reject::Unsure { got_px, limit_px: COVERED_SIGMA_PX });
+        let sides = [&self.left, &self.right];
+        let sparse = |side: &&Tracer| side.is_covered() && side.used_share() < PLENTY_CLEAR;
+        let winding = |side: &&Tracer| side.is_covered() && side.seems_winding();
+        let (limit, unsure) = if sides.iter().any(winding) {
+            (WINDING_SIGMA_PX, true)
+        } else {
+            (COVERED_SIGMA_PX, sides.iter().any(sparse))
+        };
+        if unsure && got_px > limit {
+            return Err(Reject::Unsure { got_px, limit_px: limit });
         }
         Ok(())
     }

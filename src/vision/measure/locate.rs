@@ -10,7 +10,7 @@ use crate::vision::rank;
 use crate::vision::reject::Reject;
 use crate::vision::saturated;
 use crate::vision::strip::{Grey, Strip};
-use crate::vision::trace::Scene;
+use crate::vision::trace::{Scene, Tracer};
 
 /// Least deviation that makes an outlier of a caliper line that was fitted for
 /// itself \[px\].
@@ -73,7 +73,8 @@ impl Work {
             }
             self.is_lost = self.one_is_lost();
             let found = self.left.is_located() && self.right.is_located();
-            if found && !self.is_lost && !is_strange([self.left.misfit, self.right.misfit]) {
+            let misfits = [&self.left, &self.right].map(Tracer::misfit_of_a_row);
+            if found && !self.is_lost && !is_strange(misfits) {
                 self.least_off_px = OFF_PX;
                 return Ok(());
             }

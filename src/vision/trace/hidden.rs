@@ -1,11 +1,12 @@
 //! An edge one side of which passes the end of the camera's scale.
 
 use super::{
-    Extent, Located, MAX_PASSES, NEAR_ENOUGH, Scene, State, Step, Tracer, narrow, typical,
+    Extent, Located, MAX_PASSES, NEAR_ENOUGH, Scene, State, Step, Tracer, float, narrow, typical,
 };
 use crate::vision::cut_off;
 use crate::vision::path;
 use crate::vision::pool;
+use crate::vision::rank;
 use crate::vision::step::StepTable;
 use crate::vision::strip::Grey;
 
@@ -14,9 +15,14 @@ const END: f64 = 255.0;
 /// Levels that come so near it are cut off by noise, in standard deviations.
 const NEAR_END: f64 = 1.5;
 
-/// Times that a path is smoothed before an edge that is cut off is read along
-/// it.
+/// Times that a path is smoothed at most before an edge that is cut off is read
+/// along it.
 const SMOOTHINGS: usize = 4;
+/// Mean square of what a smooth path leaves, in the variance of the places that it
+/// runs through and beside it as a share of the blur, from which on it is no longer
+/// the edge's, which is rough.
+const SMOOTHED_AWAY: f32 = 4.0;
+const BESIDE_BLURS: f32 = 0.1;
 
 impl Tracer {
     /// Blur of the edge that was looked at and its standard deviation \[px\].
@@ -64,7 +70,7 @@ impl Tracer {
         self.locate_cut_off(table, scene, &task, &rough);
         // A path that jitters rounds off the corner at the end of the scale,
         // which looks like a higher level.
-        self.straighten(scene);
+        self.straighten(scene, rough.step.blur);
         self.overlay.lay(&self.sheet);
         let start = cut_off::Step { at: 0.0, ..rough.step };
         let first = self.cut_off.fit(table, &task, &self.overlay, (start, None))?;
@@ -88,19 +94,37 @@ impl Tracer {
         Some(found)
     }
 
-    /// Draws a smooth path through the edges that were found.
-    fn straighten<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+    /// Draws a path through the edges that were found, as smooth as the edge is.
+    fn straighten<T: Grey>(&mut self, scene: &Scene<'_, T>, blur: f64) {
         let places = self.edges.iter().map(|edge| edge.map(|edge| narrow(edge.at)));
         if !path::fill(places, &mut self.rough) {
             return;
         }
         path::median_of_three(&mut self.rough);
+        let variances = self.edges.iter().flatten().map(|edge| edge.variance);
+        let variance = variances.sum::<f64>() / float(self.edges.len());
+        let limit = SMOOTHED_AWAY * narrow(variance) + (BESIDE_BLURS * narrow(blur)).powi(2);
+        self.free.clear();
+        self.free.extend_from_slice(&self.rough);
         for _ in 0..SMOOTHINGS {
             path::smooth(&self.rough, &mut self.path);
+            if self.smoothed_away() > limit {
+                break;
+            }
             std::mem::swap(&mut self.rough, &mut self.path);
         }
         self.course.redraw(scene.lines, &self.rough, &mut self.memory);
         self.read(scene);
+    }
+
+    /// Mean square of how far the path lies off the places that it was drawn through,
+    /// from the median, so that a few wild ones do not count \[px²\].
+    fn smoothed_away(&mut self) -> f32 {
+        self.sorted.clear();
+        let offs = self.path.iter().zip(&self.free).map(|(path, at)| (path - at).powi(2));
+        self.sorted.extend(offs);
+        // 0.455 is the median of the square of a standard normal number.
+        rank::median(&mut self.sorted).unwrap_or(0.0) / 0.455
     }
 
     fn locate_cut_off<T: Grey>(

@@ -1,6 +1,6 @@
 //! Levels on either side of an edge, band by band.
 
-use super::{Scene, Tracer};
+use super::{Extent, Scene, Tracer, narrow};
 use crate::vision::path;
 use crate::vision::rank;
 use crate::vision::strip::Grey;
@@ -14,6 +14,23 @@ impl Tracer {
     #[inline(always)]
     pub(super) fn pick_levels<T: Grey>(&mut self, scene: &Scene<'_, T>) {
         self.pick_raw_levels(scene);
+        self.smooth_levels();
+    }
+
+    /// Picks levels anew along the course, where it was drawn through better places
+    /// and it is known how far there is nothing but the edge \[px\].
+    pub(super) fn pick_levels_within<T: Grey>(&mut self, scene: &Scene<'_, T>, room: Extent) {
+        let Self { path, course, .. } = self;
+        path.clear();
+        let middles = (0..scene.bands.count()).map(|band| narrow(scene.bands.middle(band)));
+        path.extend(middles.map(|middle| course.at(middle)[0]));
+        self.pick_levels_in(scene, [narrow(room.before), narrow(room.after)]);
+        self.smooth_levels();
+        self.levels.draw(scene.bands, &self.path, &self.before, &self.step);
+        self.course.take_levels(&self.levels);
+    }
+
+    fn smooth_levels(&mut self) {
         path::median_of_three(&mut self.before);
         path::median_of_three(&mut self.step);
         path::smooth(&self.before, &mut self.rough);
@@ -25,12 +42,15 @@ impl Tracer {
 
     /// The same, each band for itself.
     pub(super) fn pick_raw_levels<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        let inside = 0.45 * scene.width_px;
+        let room = if scene.bead_after { [f32::INFINITY, inside] } else { [inside, f32::INFINITY] };
+        self.pick_levels_in(scene, room);
+    }
+
+    fn pick_levels_in<T: Grey>(&mut self, scene: &Scene<'_, T>, room: [f32; 2]) {
         self.before.clear();
         self.step.clear();
-        let inside = 0.45 * scene.width_px;
-        let (room_before, room_after) =
-            if scene.bead_after { (f32::INFINITY, inside) } else { (inside, f32::INFINITY) };
-        let (left, right) = (picked(-1.0, room_before), picked(1.0, room_after));
+        let (left, right) = (picked(-1.0, room[0]), picked(1.0, room[1]));
         let unit = scene.bands.unit();
         for (band, &at) in self.path.iter().enumerate() {
             let profile = scene.bands.profile(band);

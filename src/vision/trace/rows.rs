@@ -110,6 +110,7 @@ impl Tracer {
         let limit = variance * (pixels + MANY_SIGMA * (2.0 * pixels * alike).sqrt());
         let limit = limit.max(UNLIKE * median);
         self.misfit = f64::from(median / (variance * pixels)).sqrt();
+        self.together = together.into();
         let covered =
             |group: &&Group| group.misfit > UNFIT * limit || group.misfit == f32::INFINITY;
         let unfit = self.groups.iter().filter(covered).count();

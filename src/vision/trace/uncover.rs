@@ -96,6 +96,7 @@ impl Tracer {
     /// them would pass for texture.
     fn look_row_by_row(&mut self) {
         self.sort_rows = true;
+        self.winds = false;
         self.texture = None;
         self.scatter_in_texture = None;
     }

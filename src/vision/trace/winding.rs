@@ -1,0 +1,179 @@
+//! An edge that winds more quickly than the bands of the first pick show it, as that of
+//! a rough bead does in a tall gauge: it is picked anew, caliper line by caliper line.
+
+use super::{COVERED_SHARE, Look, Scene, Tracer, narrow, typical};
+use crate::vision::number::single;
+use crate::vision::path;
+use crate::vision::pool;
+use crate::vision::rank;
+use crate::vision::sheet::{MIDDLE, SPAN, Window};
+use crate::vision::step::StepTable;
+use crate::vision::strip::Grey;
+
+/// How far a band lies off the line between its neighbours from which on an edge winds
+/// \[px\]: three of four bands do. Grains, which put some far off, do not make an
+/// edge wind.
+const WINDING_PX: f32 = 0.12;
+/// The same for each share of the step that the noise of a pixel is \[px\]: picks
+/// scatter by it.
+const WINDING_IN_NOISE_PX: f32 = 2.5;
+/// Times that a winding edge is followed.
+const PASSES: usize = 3;
+/// How far beside the line between two bands the edge is looked for \[px\].
+const ASIDE_PX: usize = 8;
+/// Pixels on either side of a step that tell its height.
+const REACH: usize = 4;
+/// Share of the expected step that a line must show.
+const LEAST_STEP: f32 = 0.25;
+
+impl Tracer {
+    /// Draws the path of a winding edge from line to line, where there are more lines
+    /// than bands.
+    #[inline(always)]
+    pub(super) fn follow_windings<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        self.seems_winding = could_wind(scene) && self.seems_to_wind(scene.noise);
+        if self.seems_winding {
+            self.pick_lines(scene);
+        }
+    }
+
+    /// Whether an edge that could wind has lines without a place, or with few rows.
+    pub(super) fn lost_lines<T: Grey>(&self, scene: &Scene<'_, T>) -> bool {
+        could_wind(scene) && self.used_share() < 1.0 - COVERED_SHARE
+    }
+
+    /// Whether most bands lie off the line between their neighbours.
+    fn seems_to_wind(&mut self, noise: f32) -> bool {
+        let least = WINDING_PX.max(WINDING_IN_NOISE_PX * noise / typical(&self.step).abs());
+        self.sorted.clear();
+        let offs = self.picked.windows(3).map(|near| (near[1] - 0.5 * (near[0] + near[2])).abs());
+        self.sorted.extend(offs.filter(|off| !off.is_nan()));
+        let quarter = self.sorted.len() / 4;
+        rank::at(&mut self.sorted, quarter).is_some_and(|off| off > least)
+    }
+
+    /// Locates the edge along places picked from line to line. Returns whether all but a
+    /// few rows show it: then it winds, and nothing covers it.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn trace_winding<T: Grey>(
+        &mut self,
+        table: &StepTable,
+        scene: &Scene<'_, T>,
+    ) -> bool {
+        if !could_wind(scene) {
+            return false;
+        }
+        self.pick_lines(scene);
+        for _ in 0..PASSES {
+            self.lay_over(table, scene);
+            let Some(Look { room, .. }) = self.seen else { return false };
+            self.pick_levels_within(scene, room);
+            let Some(blur) = self.lay_over(table, scene) else { return false };
+            if !self.trace_open(table, scene, blur) {
+                return false;
+            }
+            if self.unfit <= COVERED_SHARE {
+                return true;
+            }
+            self.redraw(scene);
+        }
+        false
+    }
+
+    /// Fills the rough places with the edges that were found; where none was, a
+    /// winding edge stays on its course, and another one runs straight on.
+    pub(super) fn fill_from_edges<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        let (course, winds) = (&self.course, self.winds);
+        let places = self.edges.iter().zip(scene.lines).map(|(edge, &line)| match edge {
+            Some(edge) => Some(narrow(edge.at)),
+            None => winds.then(|| course.at(narrow(pool::middle(line)))[0]),
+        });
+        path::fill(places, &mut self.rough);
+    }
+
+    /// Draws the course through the places where each line has its highest step.
+    #[cold]
+    #[inline(never)]
+    fn pick_lines<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+        let picked = self.picked.iter().map(|at| at.is_finite().then_some(*at));
+        if !path::fill(picked, &mut self.path) {
+            return;
+        }
+        path::take_out_wild(&mut self.path, &mut self.sorted);
+        let rest = self.path.iter().map(|at| at.is_finite().then_some(*at));
+        path::fill(rest, &mut self.rough);
+        std::mem::swap(&mut self.path, &mut self.rough);
+        self.course.draw(scene.bands, &self.path, &self.before, &self.step);
+        let course = &self.course;
+        let tall = scene.strip.along.div_ceil(scene.lines.len());
+        self.sheet.read(scene.strip, scene.lines, (0.0, tall), |v| course.at(v));
+        let windows = self.sheet.windows().iter().enumerate();
+        let picks = windows.map(|(number, window)| pick(window, self.sheet.pixels(number)));
+        if path::fill(picks, &mut self.rough) {
+            path::median_of_three(&mut self.rough);
+            self.course.redraw(scene.lines, &self.rough, &mut self.memory);
+            self.winds = true;
+        }
+    }
+}
+
+/// Whether there are more lines than bands, so that an edge may wind between these.
+fn could_wind<T: Grey>(scene: &Scene<'_, T>) -> bool {
+    scene.lines.len() > scene.bands.count()
+}
+
+/// Place of the highest step of the expected kind in a window \[px\].
+fn pick(window: &Window, pixels: &[f32; SPAN]) -> Option<f32> {
+    let [_, _, step] = window.expected;
+    let height = |k: usize| {
+        let sum = |from: usize| pixels[from..from + REACH].iter().sum::<f32>();
+        (sum(k) - sum(k - REACH)) / step
+    };
+    let near = MIDDLE - ASIDE_PX..=MIDDLE + 1 + ASIDE_PX;
+    let best = near.max_by(|&a, &b| height(a).total_cmp(&height(b)))?;
+    let [before, here, after] = [height(best - 1), height(best), height(best + 1)];
+    let bend = before + after - 2.0 * here;
+    let enough = here >= LEAST_STEP * single(REACH) && bend < 0.0;
+    let ahead = (0.5 * (before - after) / bend).clamp(-1.0, 1.0);
+    enough.then(|| place(window.first) + single(best) - 0.5 + ahead)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a place near the gauge")]
+fn place(at: isize) -> f32 {
+    at as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn window(at: f64, heights: [f64; 2]) -> (Window, [f32; SPAN]) {
+        let table = StepTable::default();
+        let level = |from: f64, k: usize| {
+            let (step, _) = table.at((f64::from(single(k)) + 100.0 - from) / 1.5);
+            step
+        };
+        let pixels = std::array::from_fn(|k| {
+            narrow(40.0 + heights[0] * level(at, k) + heights[1] * level(at - 30.0, k))
+        });
+        let expected = [156.0, 40.0, narrow(heights[0])];
+        (Window { line: 0, rows: 8.0, middle: 3.5, first: 100, expected }, pixels)
+    }
+
+    #[test]
+    fn a_step_is_picked_where_it_is_and_no_other() {
+        for (at, height) in [(151.3, 80.0), (156.0, -60.0), (162.75, 12.0)] {
+            let (window, pixels) = window(at, [height, 3.0 * height]);
+            let found = f64::from(pick(&window, &pixels).unwrap());
+            assert!((found - at).abs() < 0.15, "{found} for {at}");
+        }
+    }
+
+    #[test]
+    fn a_step_of_the_other_kind_is_none() {
+        let (mut window, pixels) = window(156.0, [80.0, 0.0]);
+        window.expected[2] = -80.0;
+        assert_eq!(pick(&window, &pixels), None);
+    }
+}
