@@ -28,11 +28,9 @@ pub fn fill(rough: impl Iterator<Item = Option<f32>>, out: &mut Vec<f32>) -> boo
         let Some(value) = value else { continue };
         let from = last.map_or(value, |last| out[last]);
         let first = last.map_or(0, |last| last + 1);
-        #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
-        let gap = (band - last.unwrap_or(0)).max(1) as f32;
+        let gap = single((band - last.unwrap_or(0)).max(1));
         for (between, place) in (first..band).enumerate() {
-            #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
-            let share = if last.is_some() { (between + 1) as f32 / gap } else { 0.0 };
+            let share = if last.is_some() { single(between + 1) / gap } else { 0.0 };
             out[place] = from + share * (value - from);
         }
         last = Some(band);
@@ -58,9 +56,9 @@ pub fn take_out_wild(values: &mut [f32], memory: &mut Vec<f32>) {
         window.copy_from_slice(&values[from..from + WILD_WINDOW]);
         // Off the line through the window: along a slanted edge the median itself is
         // the value in the middle, however far that is off.
-        let slope = (median3(&window[6..]) - median3(&window[..3])) / 6.0;
+        let slope = (middle_of(&window[6..]) - middle_of(&window[..3])) / 6.0;
         for (k, value) in window.iter_mut().enumerate() {
-            *value -= slope * signed(k);
+            *value -= slope * single(k);
         }
         let here = window[band - from];
         window.sort_unstable_by(f32::total_cmp);
@@ -85,14 +83,10 @@ fn runs_smoothly(values: &[f32]) -> bool {
     values.windows(3).all(|near| (near[1] - 0.5 * (near[0] + near[2])).abs() < 0.5 * WILD_PX)
 }
 
-fn median3(values: &[f32]) -> f32 {
+/// The middle one of the first three values.
+fn middle_of(values: &[f32]) -> f32 {
     let (a, b, c) = (values[0], values[1], values[2]);
     a.max(b.min(c)).min(b.max(c))
-}
-
-#[expect(clippy::cast_precision_loss, reason = "there are few bands")]
-fn signed(band: usize) -> f32 {
-    band as f32
 }
 
 /// Median of three, so that a single wild value leads nothing astray.
@@ -101,7 +95,7 @@ pub fn median_of_three(values: &mut [f32]) {
     for k in 1..values.len().saturating_sub(1) {
         let here = values[k];
         let after = values[k + 1];
-        values[k] = before.max(here.min(after)).min(here.max(after));
+        values[k] = middle_of(&[before, here, after]);
         before = here;
     }
 }
@@ -114,18 +108,15 @@ pub fn smooth(values: &[f32], out: &mut Vec<f32>) {
     for band in 0..count {
         let from = band.saturating_sub(NEIGHBOURS).min(count - window);
         let (mut mean, mut slope) = (0.0, 0.0);
-        #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
-        let middle = (window - 1) as f32 / 2.0;
+        let middle = single(window - 1) / 2.0;
         let mut spread = 0.0;
         for (k, value) in values[from..from + window].iter().enumerate() {
-            #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
-            let away = k as f32 - middle;
+            let away = single(k) - middle;
             mean += value;
             slope += away * value;
             spread += away * away;
         }
-        #[expect(clippy::cast_precision_loss, reason = "there are few bands")]
-        let (count, away) = (window as f32, (band - from) as f32 - middle);
+        let (count, away) = (single(window), single(band - from) - middle);
         out.push(mean / count + if spread > 0.0 { slope / spread * away } else { 0.0 });
     }
 }
@@ -134,9 +125,9 @@ pub fn smooth(values: &[f32], out: &mut Vec<f32>) {
 /// notable: the line through the neighbours of a bent edge runs inside it. The values
 /// are scratch afterwards.
 pub fn smooth_bent(values: &mut [f32], out: &mut Vec<f32>) {
-    let middle = 0.5 * (signed(values.len()) - 1.0);
-    let square = |band: usize| (signed(band) - middle) * (signed(band) - middle);
-    let mean = (0..values.len()).map(square).sum::<f32>() / signed(values.len()).max(1.0);
+    let middle = 0.5 * (single(values.len()) - 1.0);
+    let square = |band: usize| (single(band) - middle) * (single(band) - middle);
+    let mean = (0..values.len()).map(square).sum::<f32>() / single(values.len()).max(1.0);
     let (mut sum, mut norm) = (0.0, 0.0);
     for (band, value) in values.iter().enumerate() {
         let bent = square(band) - mean;
@@ -342,7 +333,7 @@ mod tests {
 
     #[test]
     fn a_bent_edge_is_smoothed_where_it_is() {
-        let at = |k: usize| 200.0 + 3.0 * signed(k) - 0.2 * signed(k) * signed(k);
+        let at = |k: usize| 200.0 + 3.0 * single(k) - 0.2 * single(k) * single(k);
         let mut bent: Vec<f32> = (0..25).map(at).collect();
         let mut out = Vec::new();
         smooth_bent(&mut bent, &mut out);
