@@ -1,0 +1,115 @@
+//! Widths of the bead along the gauge: sections normal to its local axis, on the
+//! surface.
+
+use nalgebra::Vector2;
+
+use super::{NODES, Scene};
+use crate::geometry::SurfacePoint;
+use crate::vision::curve::Curve;
+
+/// Distance of the places from which an edge's direction and bend on the
+/// surface are taken.
+const BESIDE: f64 = 0.15;
+
+/// An edge about a place, on the surface.
+struct Local {
+    at: SurfacePoint,
+    slope: Vector2<f64>,
+    bend: Vector2<f64>,
+}
+
+impl Local {
+    fn of(scene: &Scene<'_>, curve: &Curve, t: f64) -> Option<Self> {
+        let at = scene.on_surface(curve, t)?;
+        let before = scene.on_surface(curve, t - BESIDE)? - at;
+        let after = scene.on_surface(curve, t + BESIDE)? - at;
+        let slope = (after - before) / (2.0 * BESIDE);
+        let bend = (after + before) / (BESIDE * BESIDE);
+        Some(Self { at, slope, bend })
+    }
+
+    /// Where the normal to a direction through a point crosses the edge.
+    fn crossing(&self, from: SurfacePoint, along: Vector2<f64>) -> SurfacePoint {
+        let ahead = (self.at - from).dot(&along);
+        let (slope, bend) = (self.slope.dot(&along), self.bend.dot(&along));
+        let mut moved = 0.0;
+        for _ in 0..3 {
+            let miss = ahead + moved * (slope + 0.5 * bend * moved);
+            moved -= miss / (slope + bend * moved);
+        }
+        self.at + self.slope * moved + self.bend * (0.5 * moved * moved)
+    }
+}
+
+/// Widths of the bead along the gauge, normal to its local axis.
+pub struct Sections {
+    /// Mean over the gauge \[mm\].
+    pub mean: f64,
+    /// Widths as the first three Legendre coefficients over the gauge \[mm\].
+    pub terms: [f64; 3],
+    /// Part of the lines across the gauge that runs along the bead, mean
+    /// \[mm\].
+    pub oblique: f64,
+    /// The same times the direction that a bend of 1 px gives the axis there, for
+    /// half a gauge of 1 px.
+    pub oblique_by_bend: f64,
+    /// Millimetres normal to the bead for a pixel across the gauge, left and
+    /// right.
+    pub scales: [f64; 2],
+}
+
+impl Sections {
+    /// Cuts the bead along the gauge; `None` where an edge has no point on the surface.
+    pub fn cut(scene: &Scene<'_>, curves: &[Curve; 2]) -> Option<Self> {
+        let mut sections = Self {
+            mean: 0.0,
+            terms: [0.0; 3],
+            oblique: 0.0,
+            oblique_by_bend: 0.0,
+            scales: [0.0; 2],
+        };
+        for (t, weight) in NODES {
+            let left = Local::of(scene, &curves[0], t)?;
+            let right = Local::of(scene, &curves[1], t)?;
+            let axis = (left.slope + right.slope).try_normalize(1e-12)?;
+            let middle = nalgebra::center(&left.at, &right.at);
+            let across = right.crossing(middle, axis) - left.crossing(middle, axis);
+            let width = across.norm();
+            let share = 0.5 * weight;
+            sections.mean += share * width;
+            sections.terms[0] += share * width;
+            sections.terms[1] += 3.0 * share * width * t;
+            sections.terms[2] += 5.0 * share * width * (1.5 * t * t - 0.5);
+            let oblique = share * (right.at - left.at).dot(&axis);
+            sections.oblique += oblique;
+            sections.oblique_by_bend += 3.0 * t * scene.cosine_squared(curves, t) * oblique;
+        }
+        sections.measure_scales(scene, curves)?;
+        sections.mean.is_finite().then_some(sections)
+    }
+
+    fn measure_scales(&mut self, scene: &Scene<'_>, curves: &[Curve; 2]) -> Option<()> {
+        let middles = [scene.on_surface(&curves[0], 0.0)?, scene.on_surface(&curves[1], 0.0)?];
+        let across = (middles[1] - middles[0]).try_normalize(1e-12)?;
+        let slope = |side: usize| -> Option<Vector2<f64>> {
+            Some(
+                scene.on_surface(&curves[side], BESIDE)?
+                    - scene.on_surface(&curves[side], -BESIDE)?,
+            )
+        };
+        let axis = (slope(0)? + slope(1)?).try_normalize(1e-12)?;
+        let normal = Vector2::new(-axis.y, axis.x);
+        let normal = if normal.dot(&across) < 0.0 { -normal } else { normal };
+        for (side, curve) in curves.iter().enumerate() {
+            let (u, v) = (curve.at(0.0), scene.centre());
+            let beside = scene.surface.to_mm(scene.view.to_image(u + 1.0, v))?;
+            self.scales[side] = (beside - middles[side]).dot(&normal).abs();
+        }
+        Some(())
+    }
+
+    /// Width at a place along the gauge \[mm\].
+    pub fn at(&self, t: f64) -> f64 {
+        self.terms[0] + self.terms[1] * t + self.terms[2] * (1.5 * t * t - 0.5)
+    }
+}

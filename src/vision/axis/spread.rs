@@ -1,0 +1,216 @@
+//! How sure a width is, and how rough the bead.
+
+use super::sections::Sections;
+use super::{Memory, Scene, Side};
+use crate::vision::curve::Curve;
+use crate::vision::number::float;
+use crate::vision::scatter;
+use crate::vision::trace::Located;
+use crate::vision::waviness::{CURVED, Evidence, Midline, ORDERS, legendre, norm};
+
+/// Share of the rows from which on nothing but the bead itself is seen.
+const ALL_BUT_FEW: f64 = 0.98;
+/// Inflation of a variance that an edge's misfit may hide, and by how much more
+/// for what it shows: a texture's shift of an edge hangs together over so many
+/// rows.
+const HIDDEN: f64 = 1.2;
+const ALONG: f64 = 15.0;
+/// Squared slopes of an axis, in variances of what waves make, that are none.
+const OBLIQUE: f64 = 3.0;
+
+/// How sure the width is, and how rough the bead.
+pub struct Spread {
+    /// Standard deviation of the width \[mm\], without the calibration's share.
+    pub sigma: f64,
+    /// What the doubt about the axis' direction takes from the width in the
+    /// mean: an axis that is off by an angle shows 1 − angle²/2 of it \[mm\].
+    pub shortened: f64,
+    /// Standard deviation of the width along the gauge, without that of its places
+    /// \[mm\].
+    pub roughness: f64,
+}
+
+impl Spread {
+    /// Of a width that was cut along these curves of the two edges.
+    pub fn of(
+        scene: &Scene<'_>,
+        curves: &[Curve; 2],
+        sections: &Sections,
+        memory: &mut Memory,
+    ) -> Self {
+        let (mut variance, mut noise) = (0.0, 0.0);
+        for (side, curve) in curves.iter().enumerate() {
+            let per_place = mean_variance(scene.sides[side].places);
+            let off = &memory.off[side];
+            let inflation = scatter::inflation(off, per_place, &mut memory.values)
+                .unwrap_or_else(|| scene.sides[side].inflation_with_gaps(off, curve, per_place))
+                .min(scene.sides[side].most_inflation());
+            let scale = sections.scales[side] * sections.scales[side];
+            let of_mean = per_place * inflation * curve.mean_variance;
+            variance += scale * (of_mean + scene.sides[side].common_variance);
+            noise += scale * per_place * inflation;
+        }
+        let roughness = Self::roughness(scene, sections, memory, noise);
+        variance += Self::hidden(scene, sections, roughness, memory);
+        let (shortened, of_tilt) = Self::tilted(scene, curves, sections, memory);
+        Self { sigma: (variance + of_tilt).sqrt(), shortened, roughness }
+    }
+
+    /// By how much the doubt about the axis' direction makes the width too
+    /// short, and the variance that it leaves.
+    fn tilted(
+        scene: &Scene<'_>,
+        curves: &[Curve; 2],
+        sections: &Sections,
+        memory: &mut Memory,
+    ) -> (f64, f64) {
+        let oblique = sections.oblique * sections.oblique;
+        let Some(waves) = scene.waves(curves, sections, memory) else {
+            let [tilt, bend] = Self::tilt_variances(scene, curves, memory);
+            let shortened = 0.5 * sections.mean * tilt;
+            let of_bend = sections.oblique_by_bend * sections.oblique_by_bend * bend;
+            return (shortened, oblique * tilt + of_bend + 2.0 * shortened * shortened);
+        };
+        let midline = Midline::of(curves);
+        let per_slope = scene.cosine_squared(curves, 0.0) / (scene.reach() * scene.reach());
+        let first = per_slope * scene.cosine_squared(curves, 0.0) * waves[0];
+        // Bends that waves explain are none of the axis.
+        let bends = midline.bends_of(&waves);
+        let per_bend = 0.5 * sections.mean * per_slope;
+        // Waves make a slope of their own; only what is beyond them is that of
+        // an axis, along which an error of the direction counts.
+        let beyond = (oblique - OBLIQUE * sections.mean * sections.mean * first).max(0.0);
+        let of_slope = 0.5 * sections.mean * first;
+        let of_bends = per_bend * bends.doubt;
+        // Along a bent bead the waves' bend is an error of the direction as well.
+        let by_bend = sections.oblique_by_bend / scene.reach();
+        let of_axis = beyond * first + bends.is_bent * by_bend * by_bend * waves[1];
+        let variance = of_axis + of_slope * of_slope + of_bends * of_bends;
+        (of_slope + per_bend * bends.of_waves, variance)
+    }
+
+    /// Standard deviation of the width along the gauge, without the noise of
+    /// its places.
+    fn roughness(scene: &Scene<'_>, sections: &Sections, memory: &Memory, noise: f64) -> f64 {
+        let (mut square, mut n) = (0.0, 0.0);
+        for (band, (left, right)) in memory.off[0].iter().zip(&memory.off[1]).enumerate() {
+            let (Some(left), Some(right)) = (left, right) else { continue };
+            let off = sections.scales[1] * right - sections.scales[0] * left;
+            let width = sections.at(scene.place(band)) + off - sections.mean;
+            square += width * width;
+            n += 1.0;
+        }
+        (square / f64::max(n - 1.0, 1.0) - noise).max(0.0).sqrt()
+    }
+
+    /// The bands that are missing hide bead that counts; its waviness is an error then,
+    /// which hangs together over neighbouring bands. Each edge has half of it.
+    fn hidden(scene: &Scene<'_>, sections: &Sections, roughness: f64, memory: &mut Memory) -> f64 {
+        let mut variance = 0.0;
+        for (number, side) in scene.sides.iter().enumerate() {
+            let seen: f64 = side.places.iter().flatten().map(|located| located.share).sum();
+            let missing = 1.0 - seen / float(side.places.len());
+            if missing > 0.0 {
+                memory.values.clear();
+                memory.values.extend(memory.off[number].iter().flatten());
+                let waves = scatter::correlated_variance(&memory.values);
+                let waves = (waves - mean_variance(side.places)).max(0.0);
+                let waves = waves * sections.scales[number] * sections.scales[number];
+                variance += waves.max(0.5 * roughness * roughness) * missing / seen.max(1.0);
+            }
+        }
+        variance
+    }
+
+    /// Variances of the axis' direction in the middle \[rad²\] and of its bend in
+    /// halves of the gauge: where lines across the gauge run obliquely to the bead,
+    /// an axis that is off takes them for longer or shorter. From how far the
+    /// middles lie off their course, and over how many bands that hangs together.
+    fn tilt_variances(scene: &Scene<'_>, curves: &[Curve; 2], memory: &mut Memory) -> [f64; 2] {
+        let Memory { off: [left, right], values } = memory;
+        values.clear();
+        let both = left.iter().zip(right.iter());
+        values.extend(both.filter_map(|(left, right)| Some(f64::midpoint((*left)?, (*right)?))));
+        let per_place = scatter::correlated_variance(values);
+        let slope = f64::midpoint(curves[0].slope_variance, curves[1].slope_variance);
+        let bend = f64::midpoint(curves[0].bend_variance, curves[1].bend_variance);
+        let cosine = scene.cosine_squared(curves, 0.0);
+        let per_term = per_place / (scene.reach() * scene.reach());
+        [slope * per_term * cosine * cosine, bend * per_term]
+    }
+}
+
+impl Side<'_> {
+    /// By how much places with gaps between them scatter more than noise
+    /// explains.
+    fn inflation_with_gaps(&self, off: &[Option<f64>], curve: &Curve, per_place: f64) -> f64 {
+        let places = off.iter().zip(self.places);
+        let places = places.filter_map(|(off, located)| Some(((*off)?, located.as_ref()?.share)));
+        scatter::inflation_with_gaps(places, per_place, curve.count)
+    }
+
+    /// Most that neighbouring places can hang together: what moves an edge,
+    /// unless it is the bead itself, leaves a misfit. Edges that are covered
+    /// here and there may hide anything.
+    fn most_inflation(&self) -> f64 {
+        let seen: f64 = self.places.iter().flatten().map(|located| located.share).sum();
+        if seen < ALL_BUT_FEW * float(self.places.len()) {
+            return f64::INFINITY;
+        }
+        HIDDEN + ALONG * (self.misfit * self.misfit - 1.0).max(0.0)
+    }
+}
+
+impl Scene<'_> {
+    /// How much of the midline's coefficients of the orders 1 to 4 is the
+    /// waviness of the two edges \[px²\]; `None` where there is none to speak
+    /// of. The width's course tells, and of the midline what is no straight or
+    /// evenly bent axis.
+    fn waves(
+        &self,
+        curves: &[Curve; 2],
+        sections: &Sections,
+        memory: &Memory,
+    ) -> Option<[f64; CURVED]> {
+        let mut off = [[0.0; ORDERS]; 2];
+        let mut bands = [0.0f64; 2];
+        for (band, places) in memory.off[0].iter().zip(&memory.off[1]).enumerate() {
+            let values = legendre(self.place(band));
+            for (side, place) in [places.0, places.1].into_iter().enumerate() {
+                let Some(place) = place else { continue };
+                bands[side] += 1.0;
+                for (sum, value) in off[side].iter_mut().zip(values) {
+                    *sum += place * value;
+                }
+            }
+        }
+        let scale = f64::midpoint(sections.scales[0], sections.scales[1]);
+        let per_place = self.sides.iter().map(|side| mean_variance(side.places)).sum::<f64>();
+        let mut evidence = Evidence::default();
+        for order in 1..=ORDERS {
+            let rest = |side: usize| norm(order) * off[side][order - 1] / bands[side].max(1.0);
+            let all = |side: usize| curves[side].coefficient(order) + rest(side);
+            let half_width = 0.5
+                * match order {
+                    1 | 2 => sections.terms[order] / scale + rest(1) - rest(0),
+                    _ => all(1) - all(0),
+                };
+            let noise = norm(order) * per_place / (4.0 * bands[0].min(bands[1]).max(1.0));
+            evidence.add(order, half_width, noise);
+            if order == 3 || order > CURVED {
+                evidence.add(order, f64::midpoint(all(0), all(1)), noise);
+            }
+        }
+        evidence.waves()
+    }
+}
+
+/// Mean variance of an edge's places, for a place of all of a band's rows.
+fn mean_variance(places: &[Option<Located>]) -> f64 {
+    let (mut sum, mut n) = (0.0, 0.0);
+    for located in places.iter().flatten() {
+        sum += located.variance * located.share;
+        n += 1.0;
+    }
+    sum / f64::max(n, 1.0)
+}
