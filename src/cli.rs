@@ -7,6 +7,16 @@
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "help texts give units in brackets")]
 
+/// Writes a line to standard output. One that nobody reads any more is no reason to
+/// end: a run goes on when the pipe behind it is closed.
+macro_rules! say {
+    () => { say!("") };
+    ($($text:tt)*) => {{
+        use std::io::Write;
+        _ = writeln!(std::io::stdout(), $($text)*);
+    }};
+}
+
 pub mod accuracy;
 pub mod calibrate;
 pub mod cell;

@@ -64,7 +64,7 @@ pub fn run(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
         output::write_whole(out, "accuracy.json", &json)?;
         output::write_whole(out, "accuracy.md", markdown(&figures).as_bytes())?;
     }
-    print!("{}", table(&figures));
+    say!("{}", table(&figures).trim_end());
     let missed = figures.iter().any(|figures| figures.kept == Some(false));
     Ok(if missed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }

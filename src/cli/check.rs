@@ -26,29 +26,29 @@ pub struct CheckArgs {
 /// Runs the command; the findings go to standard output.
 pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     let loaded = LoadedCell::read(&args.cell, Purpose::Measure)?;
-    println!("{}: sound", args.cell.display());
-    println!("  calibration  {}", loaded.calibration_words());
+    say!("{}: sound", args.cell.display());
+    say!("  calibration  {}", loaded.calibration_words());
     if let Calibration::Full { image_size_px: [width, height], .. } = loaded.calibration {
         let roi = loaded.cell.gauge.roi;
-        println!("  images       {width}x{height} px");
+        say!("  images       {width}x{height} px");
         if !roi.fits((width as usize, height as usize)) {
-            println!(
+            say!(
                 "  WARNING      gauge.roi_px reaches beyond the calibration's {width}x{height} px"
             );
         }
     }
-    println!("  suffices for process, render");
+    say!("  suffices for process, render");
     match Cell::parse(&args.cell, &loaded.text, Purpose::Run) {
         Ok(cell) => {
-            println!("  suffices for run, simulate");
+            say!("  suffices for run, simulate");
             if let Some(run) = &cell.run {
                 about_run(run);
             }
         }
         Err(missing) => {
-            println!("  not for run, simulate; these need besides:");
+            say!("  not for run, simulate; these need besides:");
             for problem in &missing.list {
-                println!("    {}: {}", problem.key, problem.expected);
+                say!("    {}: {}", problem.key, problem.expected);
             }
         }
     }
@@ -59,14 +59,14 @@ fn about_run(run: &RunPart) {
     if let Source::Path(path) = &run.camera.source
         && !path.exists()
     {
-        println!("  WARNING      camera.source: {} is not there now", path.display());
+        say!("  WARNING      camera.source: {} is not there now", path.display());
     }
     let seconds = run.robot.start_length.get() / run.robot.start_speed.get();
-    println!(
+    say!(
         "  control      begins {:.0} mm into the bead, after {seconds:.1} s at {}",
         run.robot.start_length.get(),
         run.robot.start_speed
     );
     let delay = run.camera.offset.get() / run.robot.start_speed.get();
-    println!("  dead time    {delay:.2} s at that speed, from nozzle to gauge");
+    say!("  dead time    {delay:.2} s at that speed, from nozzle to gauge");
 }

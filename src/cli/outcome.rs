@@ -24,9 +24,9 @@ pub fn free_folder(name: &str) -> PathBuf {
 /// Prints the figures of a run to standard output, and gives its status.
 pub fn tell(report: &LiveReport, out: &Path, max_rejected_share: f64) -> ExitCode {
     figures(&report.summary);
-    println!("report     {}", out.join("report.html").display());
+    say!("report     {}", out.join("report.html").display());
     match &report.recording {
-        Ok(recording) => println!("recording  {}", recording.path.display()),
+        Ok(recording) => say!("recording  {}", recording.path.display()),
         Err(incomplete) => eprintln!("warning: {incomplete}"),
     }
     status(report, max_rejected_share)
@@ -34,30 +34,30 @@ pub fn tell(report: &LiveReport, out: &Path, max_rejected_share: f64) -> ExitCod
 
 /// The figures, to standard output.
 pub fn figures(summary: &Summary) {
-    println!("frames     {}, {} measured", summary.frames, summary.measured);
+    say!("frames     {}, {} measured", summary.frames, summary.measured);
     for (reason, count) in &summary.rejected {
-        println!("           {count} {reason}");
+        say!("           {count} {reason}");
     }
     if let (Some(mean), Some(std)) = (summary.width_mean_mm, summary.width_std_mm) {
-        println!("width      {mean:.3} mm on average, standard deviation {std:.3} mm");
+        say!("width      {mean:.3} mm on average, standard deviation {std:.3} mm");
     }
     for sentence in &summary.advice {
-        println!("hint       {sentence}");
+        say!("hint       {sentence}");
     }
     let Some(control) = &summary.control else { return };
     if let Some(target) = summary.target_width_mm {
-        println!("target     {target} mm");
+        say!("target     {target} mm");
     }
     if let (Some(mean), Some(rms)) = (control.width_error_mean_mm, control.width_error_rms_mm) {
-        println!("error      {mean:.3} mm mean, {rms:.3} mm RMS, since control began");
+        say!("error      {mean:.3} mm mean, {rms:.3} mm RMS, since control began");
     }
     if let Some(settled) = control.width_error_rms_settled_mm {
-        println!("settled    {settled:.3} mm RMS, from 500 mm after that");
+        say!("settled    {settled:.3} mm RMS, from 500 mm after that");
     }
     if let (Some(p50), Some(p99)) = (control.latency_ms.p50, control.latency_ms.p99) {
-        println!("latency    {p50:.2} ms median, {p99:.2} ms p99");
+        say!("latency    {p50:.2} ms median, {p99:.2} ms p99");
     }
-    println!("faults     {}", control.faults);
+    say!("faults     {}", control.faults);
 }
 
 fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {

@@ -194,17 +194,17 @@ fn read(
 }
 
 fn conclude(args: &ProcessArgs, summary: &Summary, loaded: &LoadedCell) -> ExitCode {
-    println!("{} frames, {} measured", summary.frames, summary.measured);
+    say!("{} frames, {} measured", summary.frames, summary.measured);
     for (reason, count) in &summary.rejected {
-        println!("  {count} {reason}");
+        say!("  {count} {reason}");
     }
     if let (Some(mean), Some(std)) = (summary.width_mean_mm, summary.width_std_mm) {
-        println!("width {mean:.3} mm on average, standard deviation {std:.3} mm");
+        say!("width {mean:.3} mm on average, standard deviation {std:.3} mm");
     }
     for sentence in &summary.advice {
-        println!("hint: {sentence}");
+        say!("hint: {sentence}");
     }
-    println!("{}", args.out.join("report.html").display());
+    say!("{}", args.out.join("report.html").display());
     let share = summary.rejected_share();
     let most = loaded.cell.recording.max_rejected_share;
     if share > most {

@@ -66,7 +66,7 @@ pub fn run(args: &RenderArgs, voice: Voice) -> Result<()> {
     fs::rename(folder.path(), &args.out)
         .with_context(|| format!("cannot make {}", args.out.display()))?;
     let _renamed = folder.keep();
-    println!(
+    say!(
         "{frames} frames, {:.3} mm of bead apart, laid at {:.1} mm/s: {}",
         series.spacing_mm(),
         series.speed_mm_per_s(),

@@ -109,15 +109,16 @@ fn tell(report: &ReplayReport) -> ExitCode {
         tell_difference(report.compared, difference);
         return ExitCode::FAILURE;
     }
-    println!("{} steps replayed, all the same bit for bit", report.compared);
+    say!("{} steps replayed, all the same bit for bit", report.compared);
     if let Some(n) = report.unanswered {
-        println!("event {n} is the last; its step was not recorded any more");
+        say!("event {n} is the last; its step was not recorded any more");
     }
     if let Some(gap) = report.gap {
-        println!(
+        say!(
             "the record of event {} is incomplete (event {} comes next), so the rest cannot be \
              compared",
-            gap.expected, gap.found
+            gap.expected,
+            gap.found
         );
         return ExitCode::from(RECORDS_LOST);
     }
@@ -125,16 +126,16 @@ fn tell(report: &ReplayReport) -> ExitCode {
 }
 
 fn tell_difference(compared: u64, difference: &Difference) {
-    println!(
+    say!(
         "step {} differs, {:.6} s after the start; the {} before it are the same",
         difference.n,
         difference.now.secs(),
         compared.saturating_sub(1)
     );
     let json = |value: Result<String, serde_json::Error>| value.unwrap_or_else(|e| e.to_string());
-    println!("event    {}", json(serde_json::to_string(&difference.event)));
-    println!("recorded {}", step_json(&difference.recorded));
-    println!("replayed {}", step_json(&difference.replayed));
+    say!("event    {}", json(serde_json::to_string(&difference.event)));
+    say!("recorded {}", step_json(&difference.recorded));
+    say!("replayed {}", step_json(&difference.replayed));
 }
 
 fn step_json(step: &Step) -> String {

@@ -103,8 +103,8 @@ fn barjuei(args: &ReproduceArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     let json = serde_json::to_vec_pretty(&work.rows).context("reproduce.json")?;
     output::write_whole(&args.out, "reproduce.json", &json)?;
     output::write_whole(&args.out, "report.html", page.page().as_bytes())?;
-    print!("{}", table(&work.rows));
-    println!("\n{about}\n{}", args.out.join("report.html").display());
+    say!("{}", table(&work.rows).trim_end());
+    say!("\n{about}\n{}", args.out.join("report.html").display());
     Ok(ExitCode::SUCCESS)
 }
 

@@ -75,12 +75,12 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     }
     let summary = logger.log.finish()?;
     outcome::figures(&summary);
-    println!(
+    say!(
         "time       {:.1} s simulated in {took_s:.3} s, {:.0} times as fast, the log included",
         end.took.secs(),
         end.took.secs() / took_s.max(1e-9)
     );
-    println!("report     {}", args.out.join("report.html").display());
+    say!("report     {}", args.out.join("report.html").display());
     Ok(status(&loaded, &summary, end))
 }
 

@@ -12,7 +12,6 @@ use crate::units::Mm;
 use super::corner;
 use super::curve::{Curve, NOTABLE_PX, Point};
 use super::gauge::Gauge;
-use super::number::float;
 use super::reject::Reject;
 use super::strip::View;
 use super::trace::Located;

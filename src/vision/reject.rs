@@ -57,6 +57,13 @@ pub enum Reject {
         /// Smallest radius that is measured, in widths.
         least_widths: f64,
     },
+    /// An edge whose places scatter about each other.
+    Scattered {
+        /// Robust standard deviation of the scatter \[px\].
+        got_px: f64,
+        /// Largest that is borne \[px\].
+        limit_px: f64,
+    },
     /// The bead's edges are known too badly: too much of them is covered.
     Unsure {
         /// Standard deviation of the width \[px\].
@@ -99,7 +106,7 @@ impl Reject {
             Self::WidthOutOfRange { .. } => "width_out_of_range",
             Self::Crooked { .. } => "crooked",
             Self::Corner { .. } => "corner",
-            Self::Unsure { .. } => "unsure",
+            Self::Scattered { .. } | Self::Unsure { .. } => "unsure",
             Self::Clipped { .. } => "clipped",
             Self::WrongSize { .. } | Self::OtherSize { .. } => "wrong_size",
             Self::OffSurface => "off_surface",
@@ -148,6 +155,10 @@ impl fmt::Display for Reject {
             Self::Corner { got_widths, least_widths } => write!(
                 f,
                 "the bead bends with a radius of {got_widths:.1} widths, measured are {least_widths:.1} or more"
+            ),
+            Self::Scattered { got_px, limit_px } => write!(
+                f,
+                "the places of an edge scatter by {got_px:.2} px about each other, {limit_px:.2} are bearable; along a rough bead more caliper lines help"
             ),
             Self::Unsure { got_px, limit_px } => write!(
                 f,

@@ -9,9 +9,9 @@ pub const SPAN: usize = 112;
 /// Pixel of a window at which the edge is expected.
 pub const MIDDLE: usize = SPAN / 2;
 
-/// Rows of a gauge from which on those of a caliper line are taken together, and
-/// how far an edge may run aside within them \[px\].
-const PLENTY: usize = 160;
+/// A gauge of more rows has plenty: those of a caliper line are taken together.
+pub const PLENTY: usize = 160;
+/// How far an edge may run aside within rows that are taken together \[px\].
 const STRAIGHT_PX: f32 = 0.6;
 
 /// A window: the mean of a few neighbouring rows \[grey levels of 256\].

@@ -101,8 +101,9 @@ pub struct Tracer {
     levels: Course,
     /// Whether the course was picked from line to line.
     winds: bool,
-    /// Whether it should have been, from how the bands lie.
-    seems_winding: bool,
+    /// How far bands lie off the line between their neighbours; more than 1 where the
+    /// edge winds between them.
+    winding: f32,
     groups: Vec<rows::Group>,
     sheet: Sheet,
     overlay: Overlay,
@@ -185,11 +186,6 @@ impl Tracer {
         (1.0 + beyond.max(0.0)).sqrt()
     }
 
-    /// Whether the edge winds more quickly than bands show it, as far as they tell.
-    pub fn seems_winding(&self) -> bool {
-        self.seems_winding
-    }
-
     /// Whether nothing covers the edge, or its clear rows are known.
     pub fn is_clear(&self) -> bool {
         matches!(self.state, State::Open | State::Covered) && self.misfit < GOOD_FIT
@@ -215,7 +211,7 @@ impl Tracer {
         self.state = State::Unseen;
         self.misfit = f64::INFINITY;
         self.sort_rows = false;
-        self.winds = false;
+        (self.winds, self.winding) = (false, 0.0);
         self.clear.clear();
         self.picked.clear();
         self.picked.extend(rough.map(|at| at.unwrap_or(f32::NAN)));
@@ -263,7 +259,7 @@ impl Tracer {
     #[inline(always)]
     pub fn trace<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>, blur: (f64, f64)) {
         let found = self.trace_open(table, scene, blur);
-        let is_open = found && self.unfit <= COVERED_SHARE && !self.lost_lines(scene);
+        let is_open = found && self.unfit <= COVERED_SHARE && !self.lost_rows(scene);
         if is_open || self.trace_winding(table, scene) {
             self.state = State::Open;
         } else if self.uncover(table, scene) {

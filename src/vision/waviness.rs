@@ -112,7 +112,7 @@ pub struct Bends {
     /// Standard deviation of that \[px²\].
     pub doubt: f64,
     /// How likely the bead itself is evenly bent.
-    pub is_bent: f64,
+    pub chance_bent: f64,
 }
 
 impl Midline {
@@ -135,18 +135,18 @@ impl Midline {
     pub fn bends_of(&self, waves: &[f64; CURVED]) -> Bends {
         let mut axis = *self;
         let (mut believed, mut doubt) = (0.0, 0.0);
-        let mut is_bent = [0.0; CURVED];
+        let mut chance_bent = [0.0; CURVED];
         for (k, in_square) in [(1, 3.0), (2, 6.0), (3, 10.0)] {
             let square = self.0[k] * self.0[k];
             let waves_alone = likelihood_of_waves(square / waves[k].max(f64::MIN_POSITIVE));
             let bent = 1.0 - waves_alone;
             axis.0[k] *= bent.sqrt();
-            is_bent[k] = bent;
+            chance_bent[k] = bent;
             believed += in_square * bent * waves[k];
             doubt += waves_alone * bent * (in_square * square).powi(2);
         }
         let of_waves = self.square() - axis.square() + believed;
-        Bends { of_waves, doubt: doubt.sqrt(), is_bent: is_bent[1] }
+        Bends { of_waves, doubt: doubt.sqrt(), chance_bent: chance_bent[1] }
     }
 }
 
@@ -221,9 +221,9 @@ mod tests {
     fn a_bend_is_waves_the_less_the_more_it_exceeds_them() {
         let of = |bend: f64| Midline([0.0, bend, 0.0, 0.0]).bends_of(&[1.0; CURVED]);
         let (small, unsure, large) = (of(1.0), of(4.0), of(12.0));
-        assert!(small.is_bent < 0.06 && (small.of_waves / 3.0 - 1.0).abs() < 0.15, "{small:?}");
+        assert!(small.chance_bent < 0.06 && (small.of_waves / 3.0 - 1.0).abs() < 0.15, "{small:?}");
         assert!(unsure.doubt > 0.3 * 3.0 * 16.0, "{unsure:?}");
-        assert!(large.is_bent > 0.98 && large.of_waves < 0.05 * 3.0 * 144.0, "{large:?}");
+        assert!(large.chance_bent > 0.98 && large.of_waves < 0.05 * 3.0 * 144.0, "{large:?}");
     }
 
     #[test]

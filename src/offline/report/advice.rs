@@ -32,8 +32,10 @@ pub fn on(status: &str) -> (&'static str, &'static str) {
             "Make roi_px larger across the bead, or bring the bead back to its middle.",
         ),
         "unsure" => (
-            "So much of an edge is covered, by grains or spots, that the rest does not tell its course.",
-            "Clear the bed of grains, shade what glitters, or make the gauge longer.",
+            "An edge scatters, or so much of it is covered, by grains or spots, that the rest does not \
+             tell its course.",
+            "Clear the bed of grains, shade what glitters, make the gauge longer, or ask for more \
+             calipers along a rough bead.",
         ),
         "wrong_size" => (
             "The gauge does not lie within the image, or the calibration was made with images of \
@@ -73,6 +75,7 @@ mod tests {
             Reject::WidthOutOfRange { got_mm: 1.0, min_mm: 2.0, max_mm: 3.0 },
             Reject::Crooked { got_rad: 1.0, limit_rad: 0.3 },
             Reject::Corner { got_widths: 0.5, least_widths: 1.5 },
+            Reject::Scattered { got_px: 2.0, limit_px: 1.5 },
             Reject::Unsure { got_px: 0.4, limit_px: 0.2 },
             Reject::Clipped { got_px: 1.0, need_px: 3.0 },
             Reject::WrongSize { image: (1, 1) },

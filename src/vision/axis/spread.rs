@@ -84,7 +84,7 @@ impl Spread {
         let of_bends = per_bend * bends.doubt;
         // Along a bent bead the waves' bend is an error of the direction as well.
         let by_bend = sections.oblique_by_bend / scene.reach();
-        let of_axis = beyond * first + bends.is_bent * by_bend * by_bend * waves[1];
+        let of_axis = beyond * first + bends.chance_bent * by_bend * by_bend * waves[1];
         let variance = of_axis + of_slope * of_slope + of_bends * of_bends;
         (of_slope + per_bend * bends.of_waves, variance)
     }

@@ -23,7 +23,7 @@ const VERY_STRANGE: f64 = 8.0;
 const COVERED_SIGMA_PX: f64 = 0.19;
 /// The same where a covered edge seems to wind: what winds aside looks covered as
 /// well, so that too little is left of such an edge.
-const WINDING_SIGMA_PX: f64 = 0.05;
+const WINDING_SIGMA_PX: f64 = 0.08;
 /// Share of clear rows from which on an edge's course is sure enough.
 const PLENTY_CLEAR: f64 = 0.6;
 /// Distance from the border of the gauge that an edge needs, in its blurs and at
@@ -36,8 +36,9 @@ const NEARER: f64 = 0.05;
 /// an edge, not noise.
 const MAX_SCATTER_PX: f64 = 1.5;
 /// The same where both edges show in all rows but for a few sparks: then they are
-/// as rough as they look.
+/// as rough as they look, and what scatters more is no bead.
 const WHOLE_SCATTER_PX: f64 = 4.0;
+/// Share of the rows that counts as all.
 const WHOLE_SHARE: f64 = 0.95;
 /// The same where one edge was hidden and had to be located line by line.
 const LOST_SCATTER_PX: f64 = 0.5;
@@ -65,7 +66,7 @@ impl Work {
             [&self.left, &self.right].iter().all(|side| side.used_share() >= need_of(side));
         let limit = self.scatter_limit();
         if worst > limit {
-            return Err(Reject::Unsure { got_px: worst, limit_px: limit });
+            return Err(Reject::Scattered { got_px: worst, limit_px: limit });
         }
         if !enough {
             let need = f64::max(need_of(&self.left), need_of(&self.right));

@@ -1,7 +1,7 @@
 //! An edge one side of which passes the end of the camera's scale.
 
 use super::{
-    Extent, Located, MAX_PASSES, NEAR_ENOUGH, Scene, State, Step, Tracer, float, narrow, typical,
+    Extent, Located, MAX_PASSES, NEAR_ENOUGH, Scene, State, Step, Tracer, narrow, typical,
 };
 use crate::vision::cut_off;
 use crate::vision::path;
@@ -18,10 +18,10 @@ const NEAR_END: f64 = 1.5;
 /// Times that a path is smoothed at most before an edge that is cut off is read
 /// along it.
 const SMOOTHINGS: usize = 4;
-/// Mean square of what a smooth path leaves, in the variance of the places that it
-/// runs through and beside it as a share of the blur, from which on it is no longer
-/// the edge's, which is rough.
+/// A path that runs farther off the places than noise puts them no longer follows its
+/// edge, which is rough: in the mean square, so many times the variance of a place,
 const SMOOTHED_AWAY: f32 = 4.0;
+/// and this much of the blur, which softens the flank too little to matter.
 const BESIDE_BLURS: f32 = 0.1;
 
 impl Tracer {
@@ -101,8 +101,12 @@ impl Tracer {
             return;
         }
         path::median_of_three(&mut self.rough);
-        let variances = self.edges.iter().flatten().map(|edge| edge.variance);
-        let variance = variances.sum::<f64>() / float(self.edges.len());
+        let (sum, n) = self
+            .edges
+            .iter()
+            .flatten()
+            .fold((0.0, 0.0), |(sum, n), edge| (sum + edge.variance, n + 1.0));
+        let variance = sum / f64::max(n, 1.0);
         let limit = SMOOTHED_AWAY * narrow(variance) + (BESIDE_BLURS * narrow(blur)).powi(2);
         self.free.clear();
         self.free.extend_from_slice(&self.rough);

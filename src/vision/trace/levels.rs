@@ -30,6 +30,7 @@ impl Tracer {
         self.course.take_levels(&self.levels);
     }
 
+    /// Smooths the picked levels from band to band.
     fn smooth_levels(&mut self) {
         path::median_of_three(&mut self.before);
         path::median_of_three(&mut self.step);
@@ -40,13 +41,15 @@ impl Tracer {
         self.steady_steps();
     }
 
-    /// The same, each band for itself.
+    /// Picks levels on either side of the edge, each band for itself.
     pub(super) fn pick_raw_levels<T: Grey>(&mut self, scene: &Scene<'_, T>) {
         let inside = 0.45 * scene.width_px;
         let room = if scene.bead_after { [f32::INFINITY, inside] } else { [inside, f32::INFINITY] };
         self.pick_levels_in(scene, room);
     }
 
+    /// The same no farther from the edge than there is room before it and after it
+    /// \[px\].
     fn pick_levels_in<T: Grey>(&mut self, scene: &Scene<'_, T>, room: [f32; 2]) {
         self.before.clear();
         self.step.clear();

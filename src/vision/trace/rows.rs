@@ -110,7 +110,8 @@ impl Tracer {
         let limit = variance * (pixels + MANY_SIGMA * (2.0 * pixels * alike).sqrt());
         let limit = limit.max(UNLIKE * median);
         self.misfit = f64::from(median / (variance * pixels)).sqrt();
-        self.together = together.into();
+        // The variance of a window in texture has the texture's share of it already.
+        self.together = if self.texture.is_some() { 1.0 } else { together.into() };
         let covered =
             |group: &&Group| group.misfit > UNFIT * limit || group.misfit == f32::INFINITY;
         let unfit = self.groups.iter().filter(covered).count();

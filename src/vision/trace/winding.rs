@@ -6,17 +6,20 @@ use crate::vision::number::single;
 use crate::vision::path;
 use crate::vision::pool;
 use crate::vision::rank;
-use crate::vision::sheet::{MIDDLE, SPAN, Window};
+use crate::vision::sheet::{MIDDLE, PLENTY, SPAN, Window};
 use crate::vision::step::StepTable;
 use crate::vision::strip::Grey;
 
 /// How far a band lies off the line between its neighbours from which on an edge winds
-/// \[px\]: three of four bands do. Grains, which put some far off, do not make an
-/// edge wind.
+/// \[px\]: three of four bands do. Grains on a tenth of the rows do not make an edge
+/// wind; those on a third do.
 const WINDING_PX: f32 = 0.12;
 /// The same for each share of the step that the noise of a pixel is \[px\]: picks
 /// scatter by it.
 const WINDING_IN_NOISE_PX: f32 = 2.5;
+/// Share of its rows that an edge may lose to a spark or two; one that loses more
+/// may wind.
+const MOST_LOST: f64 = 0.12;
 /// Times that a winding edge is followed.
 const PASSES: usize = 3;
 /// How far beside the line between two bands the edge is looked for \[px\].
@@ -31,25 +34,31 @@ impl Tracer {
     /// than bands.
     #[inline(always)]
     pub(super) fn follow_windings<T: Grey>(&mut self, scene: &Scene<'_, T>) {
-        self.seems_winding = could_wind(scene) && self.seems_to_wind(scene.noise);
-        if self.seems_winding {
+        self.winding = if could_wind(scene) { self.winding(scene.noise) } else { 0.0 };
+        if self.seems_winding() {
             self.pick_lines(scene);
         }
     }
 
-    /// Whether an edge that could wind has lines without a place, or with few rows.
-    pub(super) fn lost_lines<T: Grey>(&self, scene: &Scene<'_, T>) -> bool {
-        could_wind(scene) && self.used_share() < 1.0 - COVERED_SHARE
+    /// Whether an edge that could wind has lost more rows than sparks explain.
+    pub(super) fn lost_rows<T: Grey>(&self, scene: &Scene<'_, T>) -> bool {
+        could_wind(scene) && self.used_share() < 1.0 - MOST_LOST
     }
 
-    /// Whether most bands lie off the line between their neighbours.
-    fn seems_to_wind(&mut self, noise: f32) -> bool {
+    /// Whether the edge winds more quickly than bands show it, as far as they tell.
+    pub fn seems_winding(&self) -> bool {
+        self.winding > 1.0
+    }
+
+    /// How far most bands lie off the line between their neighbours, 1 where that is
+    /// more than picks scatter.
+    fn winding(&mut self, noise: f32) -> f32 {
         let least = WINDING_PX.max(WINDING_IN_NOISE_PX * noise / typical(&self.step).abs());
         self.sorted.clear();
         let offs = self.picked.windows(3).map(|near| (near[1] - 0.5 * (near[0] + near[2])).abs());
         self.sorted.extend(offs.filter(|off| !off.is_nan()));
         let quarter = self.sorted.len() / 4;
-        rank::at(&mut self.sorted, quarter).is_some_and(|off| off > least)
+        rank::at(&mut self.sorted, quarter).unwrap_or(0.0) / least
     }
 
     /// Locates the edge along places picked from line to line. Returns whether all but a
@@ -61,10 +70,9 @@ impl Tracer {
         table: &StepTable,
         scene: &Scene<'_, T>,
     ) -> bool {
-        if !could_wind(scene) {
+        if !could_wind(scene) || self.seen.is_none() || !self.pick_lines(scene) {
             return false;
         }
-        self.pick_lines(scene);
         for _ in 0..PASSES {
             self.lay_over(table, scene);
             let Some(Look { room, .. }) = self.seen else { return false };
@@ -73,7 +81,7 @@ impl Tracer {
             if !self.trace_open(table, scene, blur) {
                 return false;
             }
-            if self.unfit <= COVERED_SHARE {
+            if self.unfit <= COVERED_SHARE && !self.lost_rows(scene) {
                 return true;
             }
             self.redraw(scene);
@@ -93,12 +101,13 @@ impl Tracer {
     }
 
     /// Draws the course through the places where each line has its highest step.
+    /// Returns whether there is any.
     #[cold]
     #[inline(never)]
-    fn pick_lines<T: Grey>(&mut self, scene: &Scene<'_, T>) {
+    fn pick_lines<T: Grey>(&mut self, scene: &Scene<'_, T>) -> bool {
         let picked = self.picked.iter().map(|at| at.is_finite().then_some(*at));
         if !path::fill(picked, &mut self.path) {
-            return;
+            return false;
         }
         path::take_out_wild(&mut self.path, &mut self.sorted);
         let rest = self.path.iter().map(|at| at.is_finite().then_some(*at));
@@ -110,17 +119,20 @@ impl Tracer {
         self.sheet.read(scene.strip, scene.lines, (0.0, tall), |v| course.at(v));
         let windows = self.sheet.windows().iter().enumerate();
         let picks = windows.map(|(number, window)| pick(window, self.sheet.pixels(number)));
-        if path::fill(picks, &mut self.rough) {
-            path::median_of_three(&mut self.rough);
-            self.course.redraw(scene.lines, &self.rough, &mut self.memory);
-            self.winds = true;
+        if !path::fill(picks, &mut self.rough) {
+            return false;
         }
+        path::median_of_three(&mut self.rough);
+        self.course.redraw(scene.lines, &self.rough, &mut self.memory);
+        self.winds = true;
+        true
     }
 }
 
-/// Whether there are more lines than bands, so that an edge may wind between these.
+/// Whether there are more lines than bands, so that an edge may wind between these,
+/// and plenty of rows, so that those of a line are read together.
 fn could_wind<T: Grey>(scene: &Scene<'_, T>) -> bool {
-    scene.lines.len() > scene.bands.count()
+    scene.lines.len() > scene.bands.count() && scene.strip.along > PLENTY
 }
 
 /// Place of the highest step of the expected kind in a window \[px\].
