@@ -2,12 +2,10 @@
 //! and numbers go in, numbers and frames come out.
 
 mod board;
-mod camera;
 mod lines;
 mod video;
 
-pub use board::find_board;
-pub use camera::{BoardView, CameraFit, calibrate_camera, solve_pose};
+pub use board::{find_any_board, find_board};
 pub use lines::{EdgeSettings, LineFinder, Segment, canny_hough};
 pub use video::{VideoInput, VideoReader};
 

@@ -2,13 +2,26 @@
 //! it is found from pictures of a checkerboard.
 
 pub mod board;
+pub mod bundle;
 pub mod camera;
+pub mod choose;
+pub mod corner;
 pub mod covariance;
+pub mod equations;
 pub mod file;
+pub mod focus;
+mod grey;
+pub mod homography;
+pub mod lens;
+pub mod map;
 pub mod model;
+pub mod next_view;
+pub mod outline;
 pub mod plane;
 pub mod quality;
 pub mod scale;
+pub mod share;
+pub mod sighting;
 pub mod solve;
 #[cfg(test)]
 mod synthetic;

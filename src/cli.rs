@@ -106,7 +106,7 @@ pub fn main() -> ExitCode {
         Command::Demo(args) => demo::run(args, voice),
         Command::Run(args) => run::run(args, voice),
         Command::Process(args) => process::run(args, voice),
-        Command::Calibrate(args) => calibrate::run(args).map(|()| ExitCode::SUCCESS),
+        Command::Calibrate(args) => calibrate::run(args),
         Command::Simulate(args) => simulate::run(args, voice),
         Command::Render(args) => render::run(args, voice).map(|()| ExitCode::SUCCESS),
         Command::RobotSim(args) => robot_sim::run(args).map(|()| ExitCode::SUCCESS),

@@ -6,6 +6,7 @@
 //! under its final name only when it is whole.
 
 pub mod accuracy;
+pub mod calibration;
 pub mod edges;
 pub mod log;
 pub mod names;

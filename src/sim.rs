@@ -3,6 +3,8 @@
 pub mod barjuei2022;
 pub mod bead;
 pub mod bend;
+pub mod boards;
+pub mod calibrations;
 pub mod cell;
 pub mod contour;
 pub mod convolve;

@@ -64,7 +64,7 @@ pub mod reject;
 mod saturated;
 mod scatter;
 mod sheet;
-mod step;
+pub mod step;
 mod strip;
 mod template;
 mod texture;

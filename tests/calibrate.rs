@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use nalgebra::Point2;
-use truebead::bridge::find_board;
 use truebead::calib::Calibration;
+use truebead::calib::board::Board;
+use truebead::calib::sighting;
 use truebead::frame::Channel;
 use truebead::io::{calibration_file, image_file};
 use truebead::time::Stamp;
@@ -60,7 +61,9 @@ fn the_squares_have_their_size_at_any_height_of_the_board() {
     let on_bed = calibration_file::read(&out).unwrap().surface(Mm::ZERO, None);
     let picture =
         image_file::read(&folder.join("left04.jpg"), Channel::Grey, 0, Stamp::START).unwrap();
-    let corners = find_board(&picture, (9, 6)).unwrap().unwrap();
+    let board = Board::new(9, 6, Mm::constant(25.0)).unwrap();
+    let corners = sighting::look(&board, "left04.jpg", &picture).unwrap().corners;
+    let corners: Vec<_> = corners.iter().map(|corner| corner.px).collect();
     for row in corners.chunks(9) {
         for pair in row.windows(2) {
             let side = (on_bed.to_mm(pair[1]).unwrap() - on_bed.to_mm(pair[0]).unwrap()).norm();

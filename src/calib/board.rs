@@ -1,8 +1,9 @@
 //! The checkerboard: where its inner corners are, and whether what was found
 //! in a picture can be them.
 
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3};
 
+use super::equations::Corner;
 use crate::geometry::ImagePoint;
 use crate::units::Mm;
 
@@ -12,6 +13,20 @@ pub struct Board {
     columns: usize,
     rows: usize,
     square: Mm,
+}
+
+/// A corner of the board in a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// Which one, counted row by row from 0.
+    pub index: usize,
+    /// Where it is seen \[px\].
+    pub px: ImagePoint,
+}
+
+/// All corners of a board, in its order.
+pub fn all_seen(corners_px: &[ImagePoint]) -> Vec<Seen> {
+    corners_px.iter().enumerate().map(|(index, &px)| Seen { index, px }).collect()
 }
 
 /// A board that cannot be used.
@@ -92,6 +107,32 @@ impl Board {
             .collect()
     }
 
+    /// The corners that were seen, where they are on a flat board \[mm\], and how far
+    /// they rise out of it where it is bent: along a row and along a column by a
+    /// parabola whose mean over all corners is 0, so that the board's plane stays
+    /// where it is.
+    #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
+    pub fn place(&self, seen: &[Seen]) -> Vec<Corner> {
+        let side = self.square.get();
+        let rise = |at: usize, count: usize| {
+            let half = 0.5 * (count - 1) as f64;
+            let out = (at as f64 - half) / half;
+            // Mean of the squares of evenly spaced places from -1 to 1.
+            let mean = (count + 1) as f64 / (3.0 * (count - 1) as f64);
+            mean - out * out
+        };
+        seen.iter()
+            .map(|&Seen { index, px }| {
+                let (column, row) = (index % self.columns, index / self.columns);
+                Corner {
+                    on_board: Point2::new(column as f64 * side, row as f64 * side),
+                    bend: [rise(column, self.columns), rise(row, self.rows)],
+                    seen: px,
+                }
+            })
+            .collect()
+    }
+
     /// Checks that corners form a grid that is nowhere collinear or folded, and
     /// puts rows that were counted in the mirror the right way round, so that
     /// x, y and the view turn like the axes of the camera.
@@ -128,7 +169,6 @@ impl Board {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Point2;
 
     fn board() -> Board {
         Board::new(4, 3, Mm::constant(20.0)).unwrap()
@@ -144,6 +184,19 @@ mod tests {
         assert_eq!(corners.len(), 12);
         assert_eq!(corners[3], Point3::new(60.0, 0.0, 0.0));
         assert_eq!(corners[4], Point3::new(0.0, 20.0, 0.0));
+    }
+
+    #[test]
+    fn a_bend_is_a_parabola_that_leaves_the_plane_where_it_is() {
+        let board = board();
+        let corners = board.place(&all_seen(&seen(&board)));
+        assert_eq!(corners[6].on_board, Point2::new(40.0, 20.0));
+        for side in 0..2 {
+            let mean = corners.iter().map(|corner| corner.bend[side]).sum::<f64>() / 12.0;
+            assert!(mean.abs() < 1e-12, "{mean}");
+        }
+        // From the middle of a side to its ends.
+        assert!((corners[4].bend[1] - corners[0].bend[1] - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -1,12 +1,20 @@
 //! A pinhole camera with Brown–Conrady distortion, coefficients in OpenCV's
-//! order (k1 k2 p1 p2 k3).
+//! order (k1 k2 p1 p2 k3 k4 k5 k6).
 
-use nalgebra::{Matrix2, Point2, Point3, Vector2};
+use nalgebra::{Matrix2, Matrix2x3, Point2, Point3, SMatrix, Vector2};
 
 use crate::geometry::ImagePoint;
 
 const UNDISTORT_STEPS: usize = 20;
 const UNDISTORT_TOLERANCE: f64 = 1e-13;
+
+/// Coefficients of the distortion.
+pub const COEFFICIENTS: usize = 8;
+/// Numbers of a camera: fx, fy, cx, cy, and the coefficients.
+pub const NUMBERS: usize = 4 + COEFFICIENTS;
+/// Their names, in order.
+pub const NAMES: [&str; NUMBERS] =
+    ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
 
 /// Intrinsics and distortion of a camera. Camera axes: x right, y down, z
 /// along the view.
@@ -16,11 +24,60 @@ pub struct Camera {
     pub focal_px: [f64; 2],
     /// Principal point \[px\].
     pub centre_px: [f64; 2],
-    /// k1 k2 p1 p2 k3.
-    pub distortion: [f64; 5],
+    /// k1 k2 p1 p2 k3, and of the rational model k4 k5 k6; all 0 without a lens.
+    pub distortion: [f64; COEFFICIENTS],
+}
+
+/// Where a point is seen, and how that changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Projection {
+    /// Where \[px\].
+    pub at: ImagePoint,
+    /// With the point in camera axes \[px/mm\].
+    pub of_point: Matrix2x3<f64>,
+    /// With the camera's [`NUMBERS`], in their order and units.
+    pub of_camera: SMatrix<f64, 2, NUMBERS>,
+}
+
+/// The radial part of the distortion at one squared distance from the axis.
+#[derive(Debug, Clone, Copy)]
+struct Radial {
+    /// Factor on the point.
+    factor: f64,
+    /// Its derivative after the squared distance.
+    slope: f64,
+    /// What the numerator and the denominator of the rational model are.
+    divisor: f64,
 }
 
 impl Camera {
+    /// A camera without distortion.
+    pub fn pinhole(focal_px: [f64; 2], centre_px: [f64; 2]) -> Self {
+        Self { focal_px, centre_px, distortion: [0.0; COEFFICIENTS] }
+    }
+
+    /// With five coefficients of distortion, k1 k2 p1 p2 k3.
+    pub fn with_five(self, five: [f64; 5]) -> Self {
+        let mut distortion = [0.0; COEFFICIENTS];
+        distortion[..5].copy_from_slice(&five);
+        Self { distortion, ..self }
+    }
+
+    /// All its numbers, in the order of [`NAMES`].
+    pub fn numbers(&self) -> [f64; NUMBERS] {
+        let mut numbers = [0.0; NUMBERS];
+        numbers[..2].copy_from_slice(&self.focal_px);
+        numbers[2..4].copy_from_slice(&self.centre_px);
+        numbers[4..].copy_from_slice(&self.distortion);
+        numbers
+    }
+
+    /// The camera that has these numbers.
+    pub fn from_numbers(numbers: [f64; NUMBERS]) -> Self {
+        let [fx, fy, cx, cy, distortion @ ..] = numbers;
+        Self { focal_px: [fx, fy], centre_px: [cx, cy], distortion }
+    }
+
     /// Projects a point in camera axes \[mm\] to the image \[px\]; `None`
     /// behind the camera.
     pub fn project(&self, p: Point3<f64>) -> Option<ImagePoint> {
@@ -28,10 +85,48 @@ impl Camera {
             return None;
         }
         let (d, _) = self.distort(Point2::new(p.x / p.z, p.y / p.z));
-        Some(Point2::new(
-            self.focal_px[0] * d.x + self.centre_px[0],
-            self.focal_px[1] * d.y + self.centre_px[1],
-        ))
+        Some(self.on_sensor(d))
+    }
+
+    /// The same with the derivatives. `None` behind the camera.
+    pub fn project_with_slopes(&self, p: Point3<f64>) -> Option<Projection> {
+        if p.z <= 0.0 {
+            return None;
+        }
+        let (x, y) = (p.x / p.z, p.y / p.z);
+        let (seen, slope) = self.distort(Point2::new(x, y));
+        let [fx, fy] = self.focal_px;
+        let scale = Matrix2::new(fx, 0.0, 0.0, fy);
+        let on_plane = Matrix2x3::new(1.0, 0.0, -x, 0.0, 1.0, -y) / p.z;
+        let mut of_camera = SMatrix::<f64, 2, NUMBERS>::zeros();
+        of_camera[(0, 0)] = seen.x;
+        of_camera[(1, 1)] = seen.y;
+        of_camera[(0, 2)] = 1.0;
+        of_camera[(1, 3)] = 1.0;
+        let r2 = x * x + y * y;
+        let radial = self.radial(r2);
+        let by_power = [r2, r2 * r2, r2 * r2 * r2].map(|power| power / radial.divisor);
+        // k1 k2 k3 stand in the numerator, k4 k5 k6 in the denominator.
+        for (power, number) in by_power.into_iter().zip([4, 5, 8]) {
+            of_camera[(0, number)] = fx * x * power;
+            of_camera[(1, number)] = fy * y * power;
+        }
+        for (power, number) in by_power.into_iter().zip([9, 10, 11]) {
+            of_camera[(0, number)] = -fx * x * power * radial.factor;
+            of_camera[(1, number)] = -fy * y * power * radial.factor;
+        }
+        of_camera[(0, 6)] = fx * 2.0 * x * y;
+        of_camera[(1, 6)] = fy * (r2 + 2.0 * y * y);
+        of_camera[(0, 7)] = fx * (r2 + 2.0 * x * x);
+        of_camera[(1, 7)] = fy * 2.0 * x * y;
+        Some(Projection { at: self.on_sensor(seen), of_point: scale * slope * on_plane, of_camera })
+    }
+
+    fn on_sensor(&self, p: Point2<f64>) -> ImagePoint {
+        Point2::new(
+            self.focal_px[0] * p.x + self.centre_px[0],
+            self.focal_px[1] * p.y + self.centre_px[1],
+        )
     }
 
     /// The ray of a pixel as its crossing with the plane z = 1, free of
@@ -60,25 +155,33 @@ impl Camera {
         ((distorted - seen).norm() < 1e-9).then_some(ray)
     }
 
+    fn radial(&self, r2: f64) -> Radial {
+        let [k1, k2, _, _, k3, k4, k5, k6] = self.distortion;
+        let divisor = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6));
+        let factor = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / divisor;
+        let above = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
+        let below = k4 + r2 * (2.0 * k5 + r2 * 3.0 * k6);
+        Radial { factor, slope: (above - factor * below) / divisor, divisor }
+    }
+
     /// Brown–Conrady distortion of a normalised point, and its derivative.
     fn distort(&self, p: Point2<f64>) -> (Point2<f64>, Matrix2<f64>) {
-        let [k1, k2, p1, p2, k3] = self.distortion;
+        let [_, _, p1, p2, ..] = self.distortion;
         let (x, y) = (p.x, p.y);
         let r2 = x * x + y * y;
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-        let radial_slope = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
+        let Radial { factor, slope, .. } = self.radial(r2);
         let tangential = Vector2::new(
             2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
             p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
         );
-        let cross = 2.0 * x * y * radial_slope + 2.0 * p1 * x + 2.0 * p2 * y;
+        let cross = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
         let slope = Matrix2::new(
-            radial + 2.0 * x * x * radial_slope + 2.0 * p1 * y + 6.0 * p2 * x,
+            factor + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x,
             cross,
             cross,
-            radial + 2.0 * y * y * radial_slope + 6.0 * p1 * y + 2.0 * p2 * x,
+            factor + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x,
         );
-        (Point2::new(x * radial, y * radial) + tangential, slope)
+        (Point2::new(x * factor, y * factor) + tangential, slope)
     }
 }
 
@@ -90,7 +193,7 @@ mod tests {
     const LENS: Camera = Camera {
         focal_px: [532.8, 532.9],
         centre_px: [342.5, 233.9],
-        distortion: [-0.28, 0.03, 0.0012, -0.0001, 0.1],
+        distortion: [-0.28, 0.03, 0.0012, -0.0001, 0.1, 0.02, -0.05, 0.03],
     };
 
     proptest! {
@@ -110,10 +213,33 @@ mod tests {
             let dy = (LENS.distort(Point2::new(x, y + h)).0 - LENS.distort(Point2::new(x, y - h)).0) / (2.0 * h);
             prop_assert!((slope - Matrix2::from_columns(&[dx, dy])).norm() < 1e-7);
         }
+
+        #[test]
+        fn slopes_are_the_derivatives_of_what_is_seen(x in -150.0..150.0, y in -120.0..120.0) {
+            let p = Point3::new(x, y, 300.0);
+            let seen = LENS.project_with_slopes(p).unwrap();
+            prop_assert!((seen.at - LENS.project(p).unwrap()).norm() < 1e-12);
+            for axis in 0..3 {
+                let mut step = nalgebra::Vector3::zeros();
+                step[axis] = 1e-3;
+                let by = (LENS.project(p + step).unwrap() - LENS.project(p - step).unwrap()) / 2e-3;
+                prop_assert!((by - seen.of_point.column(axis)).norm() < 1e-6);
+            }
+            for number in 0..NUMBERS {
+                let with = |by: f64| {
+                    let mut numbers = LENS.numbers();
+                    numbers[number] += by;
+                    Camera::from_numbers(numbers).project(p).unwrap()
+                };
+                let by = (with(1e-5) - with(-1e-5)) / 2e-5;
+                prop_assert!((by - seen.of_camera.column(number)).norm() < 1e-5, "{}", NAMES[number]);
+            }
+        }
     }
 
     #[test]
     fn nothing_behind_the_camera_is_seen() {
         assert_eq!(LENS.project(Point3::new(0.0, 0.0, -1.0)), None);
+        assert_eq!(LENS.project_with_slopes(Point3::new(0.0, 0.0, -1.0)), None);
     }
 }

@@ -5,6 +5,8 @@ use std::fmt::Write;
 
 use nalgebra::{Point2, Point3, Vector3};
 
+use super::camera::COEFFICIENTS;
+use super::lens::Lens;
 use super::{Calibration, Camera, Quality};
 use crate::config::Problems;
 use crate::config::table::{Document, Table};
@@ -58,7 +60,8 @@ fn read_root(root: &Table<'_>) -> Option<Calibration> {
 fn read_quality(table: &Table<'_>) -> Option<Quality> {
     let rms = table.number("reprojection_rms_px", RMS_PX);
     let width_sigma_share = table.optional_number("width_sigma_share", SHARE);
-    Some(Quality { reprojection_rms_px: rms?, width_sigma_share })
+    let seen_px = table.optional_numbers::<4>("seen_px", CENTRE_PX);
+    Some(Quality { reprojection_rms_px: rms?, width_sigma_share, seen_px })
 }
 
 #[expect(
@@ -79,12 +82,12 @@ fn read_size(root: &Table<'_>) -> Option<[u32; 2]> {
 fn read_camera(table: &Table<'_>, size: Option<[u32; 2]>) -> Option<Camera> {
     let focal = (table.number("fx_px", FOCAL_PX), table.number("fy_px", FOCAL_PX));
     let centre = (table.number("cx_px", CENTRE_PX), table.number("cy_px", CENTRE_PX));
-    let distortion = table.numbers::<5>("distortion", DISTORTION);
-    let camera = Camera {
-        focal_px: [focal.0?, focal.1?],
-        centre_px: [centre.0?, centre.1?],
-        distortion: distortion?,
-    };
+    // The five of Brown and Conrady, or the eight of the rational model.
+    let row = table.row("distortion", &[5, COEFFICIENTS], DISTORTION)?;
+    let mut distortion = [0.0; COEFFICIENTS];
+    distortion.iter_mut().zip(row).for_each(|(to, from)| *to = from);
+    let camera =
+        Camera { focal_px: [focal.0?, focal.1?], centre_px: [centre.0?, centre.1?], distortion };
     let middle = size.map(|size| size.map(|side| (f64::from(side) - 1.0) / 2.0));
     if middle.is_some_and(|middle| camera.ray(Point2::from(middle)).is_none()) {
         let found = "a lens that cannot be undone in the middle of the picture";
@@ -123,6 +126,9 @@ pub fn to_toml(
     }
     let [fx, fy] = camera.focal_px;
     let [cx, cy] = camera.centre_px;
+    let five = camera.distortion[5..].iter().all(|&k| k == 0.0);
+    let distortion = &camera.distortion[..if five { 5 } else { COEFFICIENTS }];
+    let names = if five { Lens::Five } else { Lens::Rational }.name();
     let rotation: [f64; 3] = bed.rotation_rad().into();
     let translation: [f64; 3] = bed.translation_mm().into();
     let _ = write!(
@@ -135,13 +141,12 @@ pub fn to_toml(
          fy_px = {fy:?}\n\
          cx_px = {cx:?} # pixel (0,0) is the centre of the top-left pixel\n\
          cy_px = {cy:?}\n\
-         distortion = {:?} # k1 k2 p1 p2 k3\n\
+         distortion = {distortion:?} # {names}\n\
          \n\
          [bed] # p_camera = R(rotation) * p_bed + translation\n\
          rotation_rad = {rotation:?} # Rodrigues vector; Z of the bed points at the camera\n\
          translation_mm = {translation:?}\n\
          robot_z_mm = {:?} # the robot's z when the image that fixed the plane was taken\n",
-        camera.distortion,
         robot_z.get(),
     );
     if let Some(quality) = quality {
@@ -151,6 +156,12 @@ pub fn to_toml(
             let _ = writeln!(
                 text,
                 "width_sigma_share = {share:?} # standard deviation that it leaves in a width, of the width"
+            );
+        }
+        if let Some(seen) = quality.seen_px {
+            let _ = writeln!(
+                text,
+                "seen_px = {seen:?} # first column and row, last column and row where boards were seen"
             );
         }
     }
@@ -182,11 +193,14 @@ mod tests {
         let camera = Camera {
             focal_px: [532.833_401_234_567_8, 1e-7 + 533.0],
             centre_px: [342.512_345, -1e-5],
-            distortion: [-0.28, 0.03, 1.2e-3, -1e-5, 0.1],
+            distortion: [-0.28, 0.03, 1.2e-3, -1e-5, 0.1, 0.0, 0.0, 0.0],
         };
         let bed = Pose::new(Vector3::new(3.0, 0.1, -0.2), Vector3::new(1.5, -2.25, 400.125));
-        let quality =
-            Some(Quality { reprojection_rms_px: 0.1234, width_sigma_share: Some(0.000_567) });
+        let quality = Some(Quality {
+            reprojection_rms_px: 0.1234,
+            width_sigma_share: Some(0.000_567),
+            seen_px: Some([3.25, 4.0, 630.5, 470.125]),
+        });
         let notes = ["made by hand\nfor a test".to_string()];
         let text = to_toml((&camera, &bed), [640, 480], Mm::constant(12.5), quality, &notes);
         let Calibration::Full { image_size_px, camera: c, bed: b, robot_z, quality: q } =
@@ -198,6 +212,23 @@ mod tests {
         assert_eq!((image_size_px, c, robot_z.get(), q), ([640, 480], camera, 12.5, quality));
         assert_eq!(b.translation_mm(), bed.translation_mm());
         assert!((b.rotation_rad() - bed.rotation_rad()).norm() < 1e-14);
+    }
+
+    #[test]
+    fn a_rational_lens_has_eight_coefficients_and_any_other_count_is_refused() {
+        let camera = Camera {
+            focal_px: [500.0; 2],
+            centre_px: [320.0, 240.0],
+            distortion: [-0.2, 0.03, 1e-3, -1e-4, 0.01, 0.04, -0.01, 0.002],
+        };
+        let bed = Pose::new(Vector3::new(3.0, 0.1, -0.2), Vector3::new(1.5, -2.25, 400.125));
+        let text = to_toml((&camera, &bed), [640, 480], Mm::ZERO, None, &[]);
+        let Calibration::Full { camera: back, .. } = parse("x", &text).unwrap() else {
+            unreachable!()
+        };
+        assert_eq!(back, camera);
+        let six = EXAMPLE.replace("distortion = [0.0,", "distortion = [0.0, 0.0,");
+        assert!(said(&six).contains("expected 5 or 8 numbers in brackets"), "{}", said(&six));
     }
 
     #[test]

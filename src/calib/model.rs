@@ -13,12 +13,16 @@ pub struct Quality {
     /// Root mean square of the reprojection errors \[px\].
     pub reprojection_rms_px: f64,
     /// Relative standard deviation that the calibration leaves in a width; see
-    /// [`super::covariance::Covariance::width_sigma_share`]. Files may lack it.
+    /// [`super::share::where_seen`]. Files may lack it.
     pub width_sigma_share: Option<f64>,
+    /// First column and row, last column and row between which boards were seen, and
+    /// for which the share holds \[px\]. Files may lack it.
+    pub seen_px: Option<[f64; 4]>,
 }
 
 /// What a pixel means in millimetres.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "there is one, read once")]
 pub enum Calibration {
     /// The single number of Shojaei Barjuei et al. 2022, section 4.3.1: it
     /// holds at the height at which it was taken, and knows no other.
@@ -172,7 +176,7 @@ mod tests {
             camera: Camera {
                 focal_px: [2500.0, 2500.0],
                 centre_px: [359.5, 269.5],
-                distortion: [0.0; 5],
+                distortion: [0.0; 8],
             },
             bed: Pose::new(
                 Vector3::new(std::f64::consts::PI, 0.0, 0.0),
@@ -209,7 +213,7 @@ mod tests {
     #[test]
     fn the_way_to_the_surface_and_back_is_the_identity() {
         let Calibration::Full { mut camera, .. } = straight_down() else { unreachable!() };
-        camera.distortion = [-0.2, 0.05, 1e-3, -5e-4, 0.0];
+        camera.distortion[..4].copy_from_slice(&[-0.2, 0.05, 1e-3, -5e-4]);
         let tilted = Calibration::Full {
             image_size_px: [720, 540],
             camera,

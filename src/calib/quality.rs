@@ -98,7 +98,8 @@ pub fn doubts(solution: &Solution) -> Vec<Doubt> {
     if solution.rms_px > GOOD_RMS_PX {
         doubts.push(Doubt::HighError { rms_px: solution.rms_px });
     }
-    let percent = 100.0 * solution.sigma[0] / solution.camera.focal_px[0];
+    let focal_sigma = solution.sigma.map_or(f64::INFINITY, |sigma| sigma[0]);
+    let percent = 100.0 * focal_sigma / solution.camera().focal_px[0];
     if percent > GOOD_FOCAL_PERCENT {
         doubts.push(Doubt::LooseFocal { percent });
     }
@@ -131,7 +132,7 @@ fn first_pixel_without_ray(solution: &Solution) -> Option<ImagePoint> {
     let along = |i: u32, end: f64| f64::from(i) / 2.0 * end;
     (0..9)
         .map(|i| ImagePoint::new(along(i % 3, right), along(i / 3, bottom)))
-        .find(|&px| solution.camera.ray(px).is_none())
+        .find(|&px| solution.camera().ray(px).is_none())
 }
 
 /// Angle between the board's normal and the camera's view \[degrees\].
@@ -151,8 +152,8 @@ fn covered_cells(solution: &Solution) -> usize {
     let index =
         |at: f64, size: f64| (at / size * GRID as f64).clamp(0.0, (GRID - 1) as f64) as usize;
     let mut seen = [[false; GRID]; GRID];
-    for corner in solution.views.iter().flat_map(|view| &view.corners_px) {
-        seen[index(corner.y, height)][index(corner.x, width)] = true;
+    for corner in solution.views.iter().flat_map(|view| &view.corners) {
+        seen[index(corner.px.y, height)][index(corner.px.x, width)] = true;
     }
     seen.iter().flatten().filter(|&&cell| cell).count()
 }
@@ -161,20 +162,35 @@ fn covered_cells(solution: &Solution) -> usize {
 mod tests {
     use super::*;
     use crate::calib::Camera;
+    use crate::calib::board::all_seen;
+    use crate::calib::equations::{Free, Model, SHARED};
+    use crate::calib::lens::Lens;
     use crate::geometry::Pose;
+    use nalgebra::Vector2;
 
     fn view(name: &str, corner: ImagePoint, tilt_rad: f64, rms_px: f64) -> View {
         let pose = Pose::new(Vector3::new(tilt_rad, 0.0, 0.0), Vector3::new(0.0, 0.0, 400.0));
-        View { name: name.into(), pose, rms_px, max_px: rms_px, corners_px: vec![corner] }
+        View {
+            name: name.into(),
+            pose,
+            rms_px,
+            max_px: rms_px,
+            corners: all_seen(&[corner]),
+            errors_px: vec![Vector2::new(rms_px, 0.0)],
+        }
     }
 
     fn solution(views: Vec<View>) -> Solution {
-        let (focal_px, centre_px) = ([1000.0; 2], [50.0; 2]);
+        let camera = Camera::pinhole([1000.0; 2], [50.0; 2]);
         Solution {
-            camera: Camera { focal_px, centre_px, distortion: [0.0; 5] },
-            sigma: [1.0; 9],
+            model: Model { camera, bend_mm: [0.0; 2] },
+            free: Free { lens: Some(Lens::Five), bend: false },
+            sigma: Some([1.0; SHARED]),
             image_size_px: [100, 100],
             rms_px: 0.2,
+            held_out_px: None,
+            noise_px: 0.15,
+            trials: vec![],
             views,
         }
     }
@@ -203,9 +219,9 @@ mod tests {
             [Doubt::FewViews { found: 5 }, Doubt::Coverage { covered: 1 }, Doubt::NoTilt { .. }]
         ));
         let mut folded = solution(good());
-        folded.camera.distortion[0] = -200.0;
+        folded.model.camera.distortion[0] = -200.0;
         assert_eq!(doubts(&folded), vec![Doubt::Folds { x: 0.0, y: 0.0 }]);
-        let loose = Solution { sigma: [20.0; 9], rms_px: 0.8, ..solution(good()) };
+        let loose = Solution { sigma: Some([20.0; SHARED]), rms_px: 0.8, ..solution(good()) };
         let told = doubts(&loose);
         assert!(matches!(told[..], [Doubt::HighError { .. }, Doubt::LooseFocal { .. }]));
     }

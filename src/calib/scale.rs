@@ -63,7 +63,7 @@ mod tests {
         let focal_px = [2500.0, 2500.0];
         Calibration::Full {
             image_size_px: [720, 540],
-            camera: Camera { focal_px, centre_px: [359.5, 269.5], distortion: [0.0; 5] },
+            camera: Camera { focal_px, centre_px: [359.5, 269.5], distortion: [0.0; 8] },
             bed: Pose::new(turn, Vector3::new(0.0, 0.0, 400.0)),
             robot_z: Mm::ZERO,
             quality: None,

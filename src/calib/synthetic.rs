@@ -1,16 +1,17 @@
 //! A board before a known camera, for the tests of what is found from it.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 use super::Camera;
-use super::board::Board;
+use super::board::{Board, Seen, all_seen};
+use super::sighting::Sighting;
 use crate::geometry::{ImagePoint, Pose};
 use crate::units::Mm;
 
 pub const TRUTH: Camera = Camera {
     focal_px: [1210.0, 1215.0],
     centre_px: [352.0, 263.0],
-    distortion: [-0.22, 0.11, 8e-4, -5e-4, 0.0],
+    distortion: [-0.22, 0.11, 8e-4, -5e-4, 0.0, 0.0, 0.0, 0.0],
 };
 pub const SIZE: [u32; 2] = [720, 540];
 
@@ -34,7 +35,17 @@ pub fn poses() -> Vec<Pose> {
 /// Where the true camera sees the corners of a board \[px\], each coordinate
 /// off by what `off` gives.
 pub fn corners(pose: &Pose, mut off: impl FnMut() -> f64) -> Vec<ImagePoint> {
-    let seen = |corner| TRUTH.project(pose.apply(corner)).unwrap();
+    let seen = |corner: Point3<f64>| TRUTH.project(pose.apply(corner)).unwrap();
     let board_mm = board().corners_mm();
     board_mm.into_iter().map(seen).map(|p| ImagePoint::new(p.x + off(), p.y + off())).collect()
+}
+
+/// The same as the corners that a picture shows.
+pub fn seen(pose: &Pose, off: impl FnMut() -> f64) -> Vec<Seen> {
+    all_seen(&corners(pose, off))
+}
+
+/// The same as a picture.
+pub fn sighting(name: &str, pose: &Pose, off: impl FnMut() -> f64) -> Sighting {
+    Sighting { name: name.to_owned(), image_size_px: SIZE, corners: seen(pose, off), focus: None }
 }

@@ -10,8 +10,10 @@ use clap::Args;
 use rayon::prelude::*;
 
 use super::{Voice, WrongArguments};
+use crate::offline::accuracy::calibration::{self, RigFigures};
 use crate::offline::accuracy::{Outcome, SetFigures, markdown, table};
 use crate::offline::{Progress, output};
+use crate::sim::calibrations::{self, Bench, Rig, Source};
 use crate::sim::sets::{self, Set};
 use crate::sim::studio::Studio;
 use crate::vision::Measurer;
@@ -30,7 +32,13 @@ Silent: widths that are more than half a pixel off, as a share of all frames.
 Bound: the smallest standard deviation that the width of a straight bead can
 have in a picture that nothing disturbs; free bound: the same where its
 direction is not known. The last column names the limits that are missed; the
-status is 1 where there are any. ACCURACY.md says what every set is.")]
+status is 1 where there are any. ACCURACY.md says what every set is.
+
+  truebead accuracy --calibration
+
+calibrates cameras whose truth is known, from corners with noise and from
+rendered pictures of boards, and compares the scatter of widths with what the
+calibrations foretell.")]
 pub struct AccuracyArgs {
     /// Frames of each set
     #[arg(long, value_name = "N", default_value = "3000", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
@@ -41,13 +49,27 @@ pub struct AccuracyArgs {
     /// Only this set; may be given more than once
     #[arg(long = "set", value_name = "NAME")]
     sets: Vec<String>,
-    /// Folder for accuracy.json and accuracy.md
+    /// Calibrations instead of widths: whether widths scatter as much from one to the
+    /// next as each foretells of itself
+    #[arg(long, conflicts_with = "sets")]
+    calibration: bool,
+    /// Calibrations of each camera from corners with noise
+    #[arg(long, value_name = "N", default_value = "2000", value_parser = clap::value_parser!(u64).range(2..=10_000_000))]
+    trials: u64,
+    /// Calibrations of each camera from rendered pictures
+    #[arg(long, value_name = "N", default_value = "100", value_parser = clap::value_parser!(u64).range(2..=10_000_000))]
+    rendered_trials: u64,
+    /// Folder for accuracy.json and accuracy.md; for calibrations
+    /// calibrations.json and calibrations.md
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
 /// Runs the command.
 pub fn run(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
+    if args.calibration {
+        return judge_calibrations(args, voice);
+    }
     let sets = chosen(&args.sets)?;
     if let Some(out) = &args.out {
         output::make_folder(out)?;
@@ -67,6 +89,44 @@ pub fn run(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
     say!("{}", table(&figures).trim_end());
     let missed = figures.iter().any(|figures| figures.kept == Some(false));
     Ok(if missed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+fn judge_calibrations(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
+    if let Some(out) = &args.out {
+        output::make_folder(out)?;
+    }
+    let rigs = calibrations::rigs().context("the rigs' boards")?;
+    let kinds = [(Source::Corners, args.trials), (Source::Pictures, args.rendered_trials)];
+    let total = rigs.len() as u64 * (args.trials + args.rendered_trials);
+    let progress = Mutex::new(Progress::new("calibrating", "trials", Some(total), voice.quiet));
+    let mut figures = Vec::new();
+    for (source, trials) in kinds {
+        for rig in &rigs {
+            figures.push(judge_rig(rig, source, trials, &progress));
+        }
+    }
+    progress.into_inner().unwrap_or_else(PoisonError::into_inner).finish();
+    if let Some(out) = &args.out {
+        let json = serde_json::to_vec_pretty(&figures).context("calibrations.json")?;
+        output::write_whole(out, "calibrations.json", &json)?;
+        output::write_whole(out, "calibrations.md", calibration::markdown(&figures).as_bytes())?;
+    }
+    say!("{}", calibration::table(&figures).trim_end());
+    let missed = figures.iter().any(|figures| !figures.missed.is_empty());
+    Ok(if missed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+fn judge_rig(rig: &Rig, source: Source, trials: u64, progress: &Mutex<Progress>) -> RigFigures {
+    let bench = Bench::new(rig.clone(), source);
+    let outcomes: Vec<_> = (0..trials)
+        .into_par_iter()
+        .map(|trial| {
+            let outcomes = bench.calibrate(trial);
+            progress.lock().unwrap_or_else(PoisonError::into_inner).advance();
+            outcomes
+        })
+        .collect();
+    RigFigures::of(rig, source, &outcomes)
 }
 
 /// The named sets, or all.

@@ -1,28 +1,33 @@
 //! `truebead calibrate`: camera and bed plane from pictures of a checkerboard.
 
+mod plane;
 mod report;
 
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
+use self::plane::Plane;
 use super::WrongArguments;
-use crate::bridge::{self, BoardView};
 use crate::calib::board::Board;
 use crate::calib::covariance::Covariance;
-use crate::calib::plane::bed_from_board;
+use crate::calib::map::{self, WidthMap};
+use crate::calib::next_view::{self, NextView};
 use crate::calib::quality;
-use crate::calib::solve::{self, Refusal, Sighting, Solution};
+use crate::calib::share;
+use crate::calib::sighting::{self, Looks, Refusal, Sighting};
+use crate::calib::solve::{self, Solution};
 use crate::calib::{Calibration, Quality, file};
 use crate::frame::Channel;
-use crate::geometry::Pose;
 use crate::io::camera::folder::list_images;
 use crate::io::image_file;
 use crate::io::whole_file::write_whole;
+use crate::offline::calibration::Page;
 use crate::time::Stamp;
 use crate::units::Mm;
 
@@ -34,29 +39,65 @@ Example:
 
 Take 10 to 20 sharp pictures of a flat board, tilted to several sides and in
 all parts of the picture. Take the last one with the board flat on the bed, or
-name that picture with --plane. calib/README.md tells more.")]
+name that picture with --plane. calib/README.md tells more.
+
+Besides the calibration file a report.html is written: what a width is known
+to, all over the picture, and what one more picture would bring.")]
 pub struct CalibrateArgs {
     /// Folder of checkerboard images
     input: PathBuf,
-    /// Inner corners of the board: columns x rows, each one fewer than the squares
-    #[arg(long, value_name = "COLUMNSxROWS", value_parser = parse_board)]
-    board: (usize, usize),
-    /// Side of one square [mm]
-    #[arg(long, value_name = "MM", value_parser = parse_length)]
-    square_mm: Mm,
+    #[command(flatten)]
+    board: BoardArgs,
     /// Calibration file to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Image whose board lies on the bed: one of the folder's, or any other file
+    /// Image whose board lies on the bed: one of the folder's, or any other file; give
+    /// it again for further boards on the bed
     /// [default: the last image in which the board is found]
     #[arg(long, value_name = "IMAGE")]
-    plane: Option<PathBuf>,
+    plane: Vec<PathBuf>,
     /// Height of the board's printed face above the bed [mm]
     #[arg(long, value_name = "MM", default_value = "0", value_parser = parse_length)]
     board_thickness_mm: Mm,
     /// The robot's z when the image that fixes the plane was taken [mm]
     #[arg(long, value_name = "MM", default_value = "0", value_parser = parse_length, allow_hyphen_values = true)]
     robot_z_mm: Mm,
+    /// Width of the bead that will be measured, for what is told about it [mm]
+    /// [default: a third of the picture's width]
+    #[arg(long, value_name = "MM", value_parser = parse_length)]
+    bead_mm: Option<Mm>,
+    /// Height of its top edges above the bed, for what is told about it; give it again
+    /// for further layers [mm]
+    /// [default: 0, and a twentieth of the camera's height]
+    #[arg(long, value_name = "MM", value_parser = parse_length)]
+    surface_height_mm: Vec<Mm>,
+    /// Largest standard deviation that the calibration may leave in that width, where
+    /// boards were seen; exit status 1 above it [mm]
+    #[arg(long, value_name = "MM", value_parser = parse_length)]
+    max_width_sigma_mm: Option<Mm>,
+    /// Report to write
+    /// [default: report.html beside the calibration file]
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+}
+
+/// A board, as it is told on the command line.
+#[derive(Debug, Args)]
+pub struct BoardArgs {
+    /// Inner corners of the board: columns x rows, each one fewer than the squares
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = parse_board)]
+    board: (usize, usize),
+    /// Side of one square [mm]
+    #[arg(long, value_name = "MM", value_parser = parse_length)]
+    square_mm: Mm,
+}
+
+impl BoardArgs {
+    /// Fails for a board that cannot be used.
+    pub fn board(&self) -> Result<Board, WrongArguments> {
+        let (columns, rows) = self.board;
+        Board::new(columns, rows, self.square_mm).map_err(WrongArguments::new)
+    }
 }
 
 fn parse_board(text: &str) -> Result<(usize, usize), String> {
@@ -72,52 +113,111 @@ fn parse_length(text: &str) -> Result<Mm, String> {
     Mm::new(value).map_err(|error| error.to_string())
 }
 
-/// The bed plane and where it comes from.
-struct Plane {
-    image: String,
-    assumed: bool,
-    /// The board's axes in the camera's.
-    board: Pose,
-    bed: Pose,
-    thickness: Mm,
-    robot_z: Mm,
-}
-
-/// What became of each picture, in the folder's order.
-type Looks = Vec<(String, Result<Sighting, Refusal>)>;
-
 /// Runs the command; the table and the figures go to standard output. Fails
 /// without writing anything where no calibration can be found.
-pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
-    let (columns, rows) = args.board;
-    let board = Board::new(columns, rows, args.square_mm).map_err(WrongArguments::new)?;
-    if args.board_thickness_mm < Mm::ZERO {
-        return Err(WrongArguments::new("the board's thickness cannot be below 0 mm").into());
-    }
+pub fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
+    let board = args.board.board()?;
+    check_lengths(args)?;
     let files = list_images(&args.input)
         .map_err(|error| WrongArguments::new(format!("{}: {}", error.source_name, error.what)))?;
-    check_plane(args.plane.as_deref(), &files)?;
+    plane::check(&args.plane, &files)?;
     let mut looks = look_at_all(&board, &files);
-    solve::agree_on_size(&mut looks);
+    sighting::agree_on_size(&mut looks);
+    sighting::take_out_duplicates(&mut looks);
     let seen: Vec<Sighting> = looks.iter().filter_map(|(_, look)| look.clone().ok()).collect();
     let solution = solve::solve(&board, &seen).inspect_err(|_| say(&report::refusals(&looks)))?;
     say(&report::images(&looks, &solution));
-    let plane = find_plane(args, &board, &solution, &looks)?;
-    // Corners' noise is the least of the errors where the focal length is loose.
-    let covariance = quality::settles_camera(&solution)
-        .then(|| Covariance::of(&board, &solution, &plane.board, plane.thickness))
-        .flatten();
-    let quality = Quality {
-        reprojection_rms_px: solution.rms_px,
-        width_sigma_share: covariance.as_ref().and_then(Covariance::width_sigma_share),
-    };
-    let calibration = write(args, &board, (&solution, quality), &plane)?;
-    say(&report::camera(&solution));
-    say(&report::plane(&plane));
-    say(&report::width(&calibration, covariance.as_ref()));
-    say(&report::scale(&calibration, covariance.as_ref(), plane.thickness));
-    say(&report::doubts(&solution));
-    say(&format!("\nwrote {}\n", args.out.display()));
+    let plane = plane::find(args, &board, &solution, &looks)?;
+    let findings = Findings::of(args, &board, &solution, &plane);
+    let calibration = write(args, &board, &solution, &plane, &findings)?;
+    let page = args.report.clone().unwrap_or_else(|| args.out.with_file_name("report.html"));
+    let text = Page {
+        board: &board,
+        looks: &looks,
+        solution: &solution,
+        maps: &findings.maps,
+        limit_mm: args.max_width_sigma_mm.map(Mm::get),
+        next: findings.next.as_ref(),
+        text: &text_of(args, &solution, &plane, &calibration, &findings),
+        calibration_file: &args.out.display().to_string(),
+    }
+    .page();
+    write_whole(&page, text.as_bytes())?;
+    say(&text_of(args, &solution, &plane, &calibration, &findings));
+    say(&format!("\nwrote {} and {}\n", args.out.display(), page.display()));
+    Ok(if findings.fails(args.max_width_sigma_mm) { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// What the calibration leaves open.
+struct Findings {
+    covariance: Option<Covariance>,
+    maps: Vec<WidthMap>,
+    next: Option<NextView>,
+}
+
+impl Findings {
+    fn of(args: &CalibrateArgs, board: &Board, solution: &Solution, plane: &Plane) -> Self {
+        // Corners' noise is the least of the errors where the focal length is loose.
+        let covariance = quality::settles_camera(solution)
+            .then(|| Covariance::of(board, solution, &plane.on_bed, plane.thickness))
+            .flatten();
+        let Some(known) = &covariance else {
+            return Self { covariance, maps: Vec::new(), next: None };
+        };
+        let above = Mm::new((known.camera_height_mm() / 20.0).round()).unwrap_or(Mm::ZERO);
+        let usual = [Mm::ZERO, above];
+        let told = args.surface_height_mm.as_slice();
+        let heights = if told.is_empty() { &usual[..] } else { told };
+        let bead = args.bead_mm.map(Mm::get).or_else(|| map::usual_bead_mm(known));
+        let maps = bead.map_or_else(Vec::new, |bead| {
+            heights.iter().map(|&height| WidthMap::of(known, bead, height)).collect()
+        });
+        let next = next_view::best(board, solution, known);
+        Self { covariance, maps, next }
+    }
+
+    /// Whether a width is known less well than it must be.
+    fn fails(&self, limit: Option<Mm>) -> bool {
+        let worst = self.maps.iter().map(|map| map.worst_where_seen_mm);
+        let worst = worst.reduce(|a, b| Some(a?.max(b?))).flatten();
+        limit.is_some_and(|limit| worst.is_none_or(|worst| worst > limit.get()))
+    }
+}
+
+fn text_of(
+    args: &CalibrateArgs,
+    solution: &Solution,
+    plane: &Plane,
+    calibration: &Calibration,
+    findings: &Findings,
+) -> String {
+    let covariance = findings.covariance.as_ref();
+    [
+        report::lens(solution),
+        report::camera(solution),
+        report::plane(plane),
+        report::width(calibration, covariance),
+        report::maps(&findings.maps, args.max_width_sigma_mm),
+        report::next_view(covariance, findings.next.as_ref()),
+        report::scale(calibration, covariance, plane.thickness),
+        report::doubts(solution),
+    ]
+    .concat()
+}
+
+fn check_lengths(args: &CalibrateArgs) -> Result<(), WrongArguments> {
+    if args.board_thickness_mm < Mm::ZERO {
+        return Err(WrongArguments::new("the board's thickness cannot be below 0 mm"));
+    }
+    for (name, value) in
+        [("bead-mm", args.bead_mm), ("max-width-sigma-mm", args.max_width_sigma_mm)]
+    {
+        if let Some(value) = value.filter(|&value| value <= Mm::ZERO) {
+            return Err(WrongArguments::new(format!(
+                "--{name}: found {value}, expected more than 0"
+            )));
+        }
+    }
     Ok(())
 }
 
@@ -125,31 +225,6 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
 /// reason to stop.
 fn say(text: &str) {
     let _ = std::io::stdout().write_all(text.as_bytes());
-}
-
-/// Finds a mistyped image before the long work.
-fn check_plane(plane: Option<&Path>, files: &[PathBuf]) -> Result<(), WrongArguments> {
-    match plane {
-        Some(path) if !path.is_file() && index_of(path, files).is_none() => {
-            let what = format!(
-                "--plane {}: no such image in the folder, and no such file",
-                path.display()
-            );
-            Err(WrongArguments::new(what))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// The image of the folder that is meant: by path, or by its name alone.
-fn index_of(plane: &Path, files: &[PathBuf]) -> Option<usize> {
-    let is_same = |file: &PathBuf| {
-        let by_name = plane.parent().is_none_or(|p| p.as_os_str().is_empty());
-        file == plane
-            || (by_name && file.file_name() == plane.file_name())
-            || plane.canonicalize().is_ok_and(|p| file.canonicalize().is_ok_and(|f| f == p))
-    };
-    files.iter().position(is_same)
 }
 
 fn look_at_all(board: &Board, files: &[PathBuf]) -> Looks {
@@ -167,10 +242,11 @@ fn look_at_all(board: &Board, files: &[PathBuf]) -> Looks {
     looks
 }
 
-fn look_at(board: &Board, name: &str, path: &Path) -> Result<Sighting, Refusal> {
+/// Looks for the board in an image file.
+pub fn look_at(board: &Board, name: &str, path: &Path) -> Result<Sighting, Refusal> {
     let frame = image_file::read(path, Channel::Grey, 0, Stamp::START)
         .map_err(|error| Refusal::Unreadable(error.to_string()))?;
-    solve::look(board, name, &frame)
+    sighting::look(board, name, &frame)
 }
 
 fn progress(count: usize) -> ProgressBar {
@@ -184,65 +260,13 @@ fn progress(count: usize) -> ProgressBar {
     bar
 }
 
-fn find_plane(
-    args: &CalibrateArgs,
-    board: &Board,
-    solution: &Solution,
-    looks: &Looks,
-) -> anyhow::Result<Plane> {
-    let (image, pose) = match &args.plane {
-        None => {
-            let last = solution.views.last().context("no picture shows the board")?;
-            (last.name.clone(), last.pose)
-        }
-        Some(path) => plane_pose(path, board, solution, looks)?,
-    };
-    Ok(Plane {
-        image,
-        assumed: args.plane.is_none(),
-        board: pose,
-        bed: bed_from_board(&pose, args.board_thickness_mm),
-        thickness: args.board_thickness_mm,
-        robot_z: args.robot_z_mm,
-    })
-}
-
-/// The board's pose in the named picture: out of the solution where it took
-/// part, else found with the camera that is now known.
-fn plane_pose(
-    path: &Path,
-    board: &Board,
-    solution: &Solution,
-    looks: &Looks,
-) -> anyhow::Result<(String, Pose)> {
-    let names: Vec<PathBuf> = looks.iter().map(|(name, _)| PathBuf::from(name)).collect();
-    let own = path.file_name().filter(|_| !path.is_file() || index_of(path, &names).is_some());
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    if let Some(view) = solution.views.iter().find(|view| view.name == name) {
-        return Ok((name, view.pose));
-    }
-    if own.is_some()
-        && let Some((_, Err(refusal))) = looks.iter().find(|look| look.0 == name)
-    {
-        bail!("--plane {name}: {refusal}; name an image that shows the whole board");
-    }
-    let sighting = look_at(board, &name, path)
-        .with_context(|| format!("--plane {} does not show the bed plane", path.display()))?;
-    if sighting.image_size_px != solution.image_size_px {
-        let refusal =
-            Refusal::Size { found: sighting.image_size_px, expected: solution.image_size_px };
-        bail!("--plane {}: {refusal}", path.display());
-    }
-    let view = BoardView { board_mm: board.corners_mm(), image_px: sighting.corners_px };
-    Ok((path.display().to_string(), bridge::solve_pose(&view, &solution.camera)?))
-}
-
 /// Writes the file, once it has been read back and found sound.
 fn write(
     args: &CalibrateArgs,
     board: &Board,
-    (solution, quality): (&Solution, Quality),
+    solution: &Solution,
     plane: &Plane,
+    findings: &Findings,
 ) -> anyhow::Result<Calibration> {
     let (columns, rows) = board.corners();
     let note = format!(
@@ -251,9 +275,18 @@ fn write(
         solution.views.len(),
         board.square(),
         plane.thickness,
-        plane.image,
+        plane.images.join(", "),
     );
-    let model = (&solution.camera, &plane.bed);
+    let covariance = findings.covariance.as_ref();
+    let quality = Quality {
+        reprojection_rms_px: solution.rms_px,
+        width_sigma_share: covariance.and_then(share::where_seen),
+        seen_px: covariance.map(|covariance| {
+            let [from, to] = covariance.seen_px();
+            [from.x, from.y, to.x, to.y].map(|px| (px * 10.0).round() / 10.0)
+        }),
+    };
+    let model = (solution.camera(), &plane.on_bed.bed(plane.thickness));
     let (size, robot_z) = (solution.image_size_px, plane.robot_z);
     let text = file::to_toml(model, size, robot_z, Some(quality), &[note]);
     let name = args.out.display().to_string();

@@ -225,7 +225,18 @@ impl<'a> Table<'a> {
         key: &'static str,
         range: RangeInclusive<f64>,
     ) -> Option<[f64; N]> {
-        let expected = format!("{N} numbers in brackets, each {}", expected_number(&range));
+        self.row(key, &[N], range)?.try_into().ok()
+    }
+
+    /// A row of numbers that must be there, as long as one of these counts.
+    pub fn row(
+        &self,
+        key: &'static str,
+        counts: &[usize],
+        range: RangeInclusive<f64>,
+    ) -> Option<Vec<f64>> {
+        let lengths = counts.iter().map(usize::to_string).collect::<Vec<_>>().join(" or ");
+        let expected = format!("{lengths} numbers in brackets, each {}", expected_number(&range));
         let Some(value) = self.get(key) else {
             self.absent(key, expected);
             return None;
@@ -233,11 +244,20 @@ impl<'a> Table<'a> {
         let numbers: Option<Vec<f64>> = value.get_ref().as_array().and_then(|array| {
             array.iter().map(|v| as_number(v.get_ref()).filter(|n| range.contains(n))).collect()
         });
-        let row = numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok());
+        let row = numbers.filter(|numbers| counts.contains(&numbers.len()));
         if row.is_none() {
             self.report(key, shown(value.get_ref()), expected);
         }
         row
+    }
+
+    /// The same where the key may be absent.
+    pub fn optional_numbers<const N: usize>(
+        &self,
+        key: &'static str,
+        range: RangeInclusive<f64>,
+    ) -> Option<[f64; N]> {
+        if self.has(key) { self.numbers(key, range) } else { None }
     }
 
     /// A text that is not empty; `None` where the key is absent or wrong.

@@ -1,5 +1,6 @@
 //! How well widths are measured: figures of sets of pictures with their truth.
 
+pub mod calibration;
 mod table;
 mod verdict;
 

@@ -146,7 +146,7 @@ pub fn camera_above() -> Calibration {
         camera: Camera {
             focal_px: [focal, focal],
             centre_px: [359.5, 269.5],
-            distortion: [0.0; 5],
+            distortion: [0.0; 8],
         },
         bed: Pose::new(
             Vector3::new(std::f64::consts::PI, 0.0, 0.0),

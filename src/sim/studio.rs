@@ -92,7 +92,7 @@ fn tilted() -> Calibration {
         camera: Camera {
             focal_px: [2500.0, 2490.0],
             centre_px: [352.0, 275.0],
-            distortion: [-0.15, 0.4, 1e-3, -5e-4, 0.0],
+            distortion: [-0.15, 0.4, 1e-3, -5e-4, 0.0, 0.0, 0.0, 0.0],
         },
         bed: Pose::new(Vector3::new(2.95, 0.08, -0.05), Vector3::new(3.0, -7.0, 395.0)),
         robot_z: Mm::constant(100.0),

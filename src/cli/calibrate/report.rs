@@ -4,12 +4,17 @@ use std::fmt::Write;
 
 use nalgebra::{Point3, Vector3};
 
-use super::{Looks, Plane};
+use super::plane::Plane;
 use crate::calib::Calibration;
+use crate::calib::camera::NUMBERS;
 use crate::calib::covariance::Covariance;
+use crate::calib::map::WidthMap;
+use crate::calib::next_view::NextView;
 use crate::calib::quality;
 use crate::calib::scale::single_scale;
-use crate::calib::solve::Solution;
+use crate::calib::share;
+use crate::calib::sighting::Looks;
+use crate::calib::solve::{SHARED_NAMES, Solution};
 use crate::geometry::ImagePoint;
 use crate::units::Mm;
 
@@ -32,7 +37,7 @@ pub fn images(looks: &Looks, solution: &Solution) -> String {
             (Ok(sighting), Some(view)) => line!(
                 out,
                 "{name:column$}  {:7}  {:6.3}  {:6.3}",
-                sighting.corners_px.len(),
+                sighting.corners.len(),
                 view.rms_px,
                 view.max_px
             ),
@@ -67,20 +72,41 @@ fn name_column(looks: &Looks) -> usize {
     looks.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).max("image".len())
 }
 
+/// The models of the lens that were tried, and which one was taken.
+pub fn lens(solution: &Solution) -> String {
+    let mut out = String::new();
+    line!(out, "\nlens: what each model leaves, and of pictures that took no part in it");
+    line!(out, "  {:28}  rms px  held out px", "coefficients");
+    for trial in &solution.trials {
+        let name = trial.free.lens.map_or("", |lens| lens.name());
+        let bend = if trial.free.bend { ", bent board" } else { "" };
+        let held_out = trial.held_out_px.map_or_else(|| "-".to_owned(), |px| format!("{px:.4}"));
+        let mark = if trial.free == solution.free { "  <- taken" } else { "" };
+        line!(out, "  {:28}  {:.4}  {held_out:>11}{mark}", format!("{name}{bend}"), trial.rms_px);
+    }
+    out
+}
+
 /// Intrinsics and distortion with their standard deviations.
 pub fn camera(solution: &Solution) -> String {
     let mut out = String::new();
     let [width, height] = solution.image_size_px;
     line!(out, "\ncamera ({width}x{height} px), with standard deviations");
-    let camera = &solution.camera;
-    let pixels = camera.focal_px.iter().chain(&camera.centre_px);
-    for ((name, value), sigma) in ["fx", "fy", "cx", "cy"].iter().zip(pixels).zip(&solution.sigma) {
-        line!(out, "  {name}  {value:10.3} ± {sigma:.3} px");
+    let values = solution.camera().numbers().into_iter().chain(solution.model.bend_mm);
+    for (number, (name, value)) in SHARED_NAMES.iter().zip(values).enumerate() {
+        if !solution.free.has(number) {
+            continue;
+        }
+        let sigma = solution.sigma.map(|sigma| sigma[number]);
+        let (digits, unit) = match number {
+            0..4 => (3, " px"),
+            NUMBERS.. => (3, " mm"),
+            _ => (6, ""),
+        };
+        let sigma = sigma.map_or_else(|| "?".to_owned(), |sigma| format!("{sigma:.digits$}"));
+        line!(out, "  {name:4}  {value:10.digits$} ± {sigma}{unit}");
     }
-    let lens = ["k1", "k2", "p1", "p2", "k3"].iter().zip(&camera.distortion);
-    for ((name, value), sigma) in lens.zip(&solution.sigma[4..]) {
-        line!(out, "  {name}  {value:10.6} ± {sigma:.6}");
-    }
+    line!(out, "  noise of a corner: {:.3} px", solution.noise_px);
     out
 }
 
@@ -92,11 +118,21 @@ pub fn plane(plane: &Plane) -> String {
     } else {
         "as named"
     };
-    let height = plane.bed.apply_inverse(Point3::origin()).z;
-    let up = plane.bed.rotation() * Vector3::z();
+    let bed = plane.on_bed.bed(plane.thickness);
+    let height = bed.apply_inverse(Point3::origin()).z;
+    let up = bed.rotation() * Vector3::z();
     let tilt_deg = (-up.z).clamp(-1.0, 1.0).acos().to_degrees();
     line!(out, "\nbed plane");
-    line!(out, "  image       {} ({how})", plane.image);
+    line!(out, "  image       {} ({how})", plane.images.join(", "));
+    if plane.images.len() > 1 {
+        line!(
+            out,
+            "  boards      {} on one plane, to {:.2} mm; corners {:.3} px off (RMS)",
+            plane.images.len(),
+            plane.on_bed.off_mm,
+            plane.on_bed.rms_px
+        );
+    }
     line!(
         out,
         "  board       its printed face lies {} above the bed (--board-thickness-mm)",
@@ -114,7 +150,7 @@ pub fn plane(plane: &Plane) -> String {
 /// an example.
 pub fn width(calibration: &Calibration, covariance: Option<&Covariance>) -> String {
     let mut out = String::new();
-    let shares = covariance.map(|c| (c, c.width_sigma_share(), c.width_sigma_share_anywhere()));
+    let shares = covariance.map(|c| (c, share::where_seen(c), share::anywhere(c)));
     let Some((covariance, Some(share), anywhere)) = shares else {
         line!(
             out,
@@ -140,6 +176,55 @@ pub fn width(calibration: &Calibration, covariance: Option<&Covariance>) -> Stri
         line!(out, "  in all of the picture it is {:.3} % or better", 100.0 * anywhere);
     } else {
         line!(out, "  elsewhere it cannot be told: not all of the picture sees the bed");
+    }
+    out
+}
+
+/// What is left open in the width of one bead, in millimetres, at each height.
+pub fn maps(maps: &[WidthMap], limit: Option<Mm>) -> String {
+    let mut out = String::new();
+    let Some(first) = maps.first() else { return out };
+    line!(out, "\nstandard deviation of the width of a bead of {} mm", first.bead_mm);
+    line!(out, "  {:>10}  {:>16}  {:>22}  if its height", "its height", "where boards", "all over");
+    line!(out, "  {:>10}  {:>16}  {:>22}  is 1 mm wrong", "above bed", "were seen", "the picture");
+    for map in maps {
+        let worst = map.worst_where_seen_mm.map_or_else(|| "-".into(), |mm| format!("{mm:.4} mm"));
+        let range = map.range_mm();
+        let range = range.map_or_else(|| "-".into(), |(a, b)| format!("{a:.4} to {b:.4} mm"));
+        line!(
+            out,
+            "  {:>7.1} mm  {worst:>16}  {range:>22}  {:>10.4} mm",
+            map.surface_height.get(),
+            map.by_a_millimetre_of_height_mm
+        );
+    }
+    if let Some(limit) = limit {
+        let worst = maps.iter().map(|map| map.worst_where_seen_mm);
+        match worst.reduce(|a, b| Some(a?.max(b?))).flatten() {
+            None => line!(out, "  FAIL: such a bead is not seen whole where boards were seen"),
+            Some(mm) if mm > limit.get() => {
+                line!(out, "  FAIL: {mm:.4} mm where boards were seen, more than {limit}");
+            }
+            Some(mm) => {
+                line!(out, "  PASS: {mm:.4} mm where boards were seen, no more than {limit}");
+            }
+        }
+    }
+    out
+}
+
+/// What one more picture would bring.
+pub fn next_view(covariance: Option<&Covariance>, next: Option<&NextView>) -> String {
+    let mut out = String::new();
+    match (covariance, next) {
+        (None, _) => {}
+        (Some(_), Some(next)) => {
+            line!(out, "\none more picture would help most with");
+            line!(out, "  {next}:");
+            let (before, after) = next.share;
+            line!(out, "  {:.3} % of a width instead of {:.3} %", 100.0 * after, 100.0 * before);
+        }
+        (Some(_), None) => line!(out, "\none more picture would bring less than 3 %"),
     }
     out
 }

@@ -47,29 +47,46 @@ fn cells(figures: &SetFigures) -> [String; COLUMNS] {
 
 /// The figures as a table for a terminal.
 pub fn table(figures: &[SetFigures]) -> String {
-    let mut lines = vec![HEADS.map(str::to_owned)];
-    lines.extend(figures.iter().map(cells));
-    let wide = |column: usize| {
-        lines.iter().map(|line| line[column].chars().count()).max().unwrap_or_default()
-    };
-    let widths: [usize; COLUMNS] = std::array::from_fn(wide);
-    let text = |line: &[String; COLUMNS]| {
-        let [name, middle @ .., limits] = line;
-        let mut cells = vec![format!("{name:width$}", width = widths[0])];
-        let numbers = middle.iter().zip(&widths[1..]);
-        cells.extend(numbers.map(|(cell, width)| format!("{cell:>width$}")));
-        format!("{}  {limits}\n", cells.join("  "))
-    };
-    lines.iter().map(text).collect()
+    aligned(&HEADS, figures.iter().map(cells))
 }
 
 /// The figures as a table in Markdown.
 pub fn markdown(figures: &[SetFigures]) -> String {
-    let rule = format!("|---|{}---|\n", "---:|".repeat(COLUMNS - 2));
-    let head = format!("| {} |\n{rule}", HEADS.join(" | "));
-    figures
-        .iter()
-        .fold(head, |text, figures| text + &format!("| {} |\n", cells(figures).join(" | ")))
+    marked(&HEADS, figures.iter().map(cells))
+}
+
+/// Lines for a terminal: the first and the last cell of each begin in one column, the
+/// others end in one.
+pub(super) fn aligned<const N: usize>(
+    heads: &[&str; N],
+    rows: impl Iterator<Item = [String; N]>,
+) -> String {
+    let mut lines = vec![heads.map(str::to_owned)];
+    lines.extend(rows);
+    let wide = |column: usize| {
+        lines.iter().map(|line| line[column].chars().count()).max().unwrap_or_default()
+    };
+    let widths: [usize; N] = std::array::from_fn(wide);
+    let text = |line: &[String; N]| {
+        let cells =
+            line.iter().zip(widths).enumerate().map(|(column, (cell, width))| match column {
+                0 => format!("{cell:width$}"),
+                _ if column + 1 == N => cell.clone(),
+                _ => format!("{cell:>width$}"),
+            });
+        format!("{}\n", cells.collect::<Vec<_>>().join("  "))
+    };
+    lines.iter().map(text).collect()
+}
+
+/// The same in Markdown.
+pub(super) fn marked<const N: usize>(
+    heads: &[&str; N],
+    rows: impl Iterator<Item = [String; N]>,
+) -> String {
+    let rule = format!("|---|{}---|\n", "---:|".repeat(N - 2));
+    let head = format!("| {} |\n{rule}", heads.join(" | "));
+    rows.fold(head, |text, cells| text + &format!("| {} |\n", cells.join(" | ")))
 }
 
 #[cfg(test)]

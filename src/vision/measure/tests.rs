@@ -65,7 +65,7 @@ fn an_edge_at_the_border_of_the_gauge_is_no_edge() {
 
 #[test]
 fn images_of_another_size_than_the_calibrations_are_refused() {
-    let camera = Camera { focal_px: [500.0; 2], centre_px: [200.0, 30.0], distortion: [0.0; 5] };
+    let camera = Camera { focal_px: [500.0; 2], centre_px: [200.0, 30.0], distortion: [0.0; 8] };
     let bed =
         Pose::new(Vector3::new(std::f64::consts::PI, 0.0, 0.0), Vector3::new(0.0, 0.0, 400.0));
     let calibration = |image_size_px: [u32; 2]| Calibration::Full {

@@ -1,0 +1,135 @@
+//! Camera, bend of the board and places of the boards that fit the corners best:
+//! least squares over all of them together (bundle adjustment), by Levenberg's and
+//! Marquardt's method.
+
+use nalgebra::{DVector, SMatrix, SVector};
+
+use super::equations::{Corner, Elimination, Equations, Factor, Free, Model, Place, SHARED};
+
+const MOST_STEPS: usize = 100;
+/// Damping at first, as a share of each equation's own weight.
+const DAMPING: f64 = 1e-3;
+const LEAST_DAMPING: f64 = 1e-12;
+/// Damping beyond which no step leads down any more.
+const MOST_DAMPING: f64 = 1e12;
+/// Share of the squares by which a step must lessen them for another one to be
+/// worth while.
+const WORTH: f64 = 1e-13;
+
+/// What fits best.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    /// The camera and the board's bend.
+    pub model: Model,
+    /// Where the boards lie, in the order of the pictures.
+    pub places: Vec<Place>,
+    /// Sum of the squares of what is left \[px²\].
+    pub squares_px2: f64,
+}
+
+/// A step of everything together.
+struct Step {
+    shared: SVector<f64, SHARED>,
+    places: Vec<DVector<f64>>,
+}
+
+/// Fits what is free to the boards that lie at each place, beginning with what is
+/// roughly known. `None` where a board is behind the camera from the start, or a
+/// number never becomes finite.
+pub fn fit(start: (Model, Vec<Place>), free: Free, boards: &[Vec<Vec<Corner>>]) -> Option<Fit> {
+    let (model, places) = start;
+    let squares_px2 = squares_px2(&model, &places, boards)?;
+    let mut best = Fit { model, places, squares_px2 };
+    let mut damping = DAMPING;
+    for _ in 0..MOST_STEPS {
+        let equations = equations(&best, free, boards)?;
+        let (next, is_last) = descend(&best, free, &equations, boards, &mut damping);
+        let Some(next) = next else { break };
+        best = next;
+        if is_last {
+            break;
+        }
+    }
+    best.model.camera.numbers().iter().all(|number| number.is_finite()).then_some(best)
+}
+
+/// The next better fit, and whether it is as good as the last; `None` where no step
+/// leads down.
+fn descend(
+    from: &Fit,
+    free: Free,
+    equations: &[Equations],
+    boards: &[Vec<Vec<Corner>>],
+    damping: &mut f64,
+) -> (Option<Fit>, bool) {
+    while *damping < MOST_DAMPING {
+        let tried = step(equations, free, *damping).and_then(|step| {
+            let model = from.model.stepped(&step.shared);
+            let places: Vec<Place> =
+                from.places.iter().zip(&step.places).map(|(place, by)| place.stepped(by)).collect();
+            let squares_px2 = squares_px2(&model, &places, boards)?;
+            (squares_px2 <= from.squares_px2).then_some(Fit { model, places, squares_px2 })
+        });
+        if let Some(found) = tried {
+            let is_last = from.squares_px2 - found.squares_px2 <= WORTH * from.squares_px2;
+            *damping = (*damping * 0.1).max(LEAST_DAMPING);
+            return (Some(found), is_last);
+        }
+        *damping *= 10.0;
+    }
+    (None, true)
+}
+
+fn squares_px2(model: &Model, places: &[Place], boards: &[Vec<Vec<Corner>>]) -> Option<f64> {
+    let each = places.iter().zip(boards).map(|(place, boards)| model.squares_px2(place, boards));
+    each.sum::<Option<f64>>().filter(|squares| squares.is_finite())
+}
+
+fn equations(at: &Fit, free: Free, boards: &[Vec<Vec<Corner>>]) -> Option<Vec<Equations>> {
+    let each = at.places.iter().zip(boards);
+    each.map(|(place, boards)| Equations::of(&at.model, free, place, boards)).collect()
+}
+
+/// Solves the damped equations, the places eliminated first.
+fn step(equations: &[Equations], free: Free, damping: f64) -> Option<Step> {
+    let mut left = SMatrix::<f64, SHARED, SHARED>::zeros();
+    let mut side = SVector::<f64, SHARED>::zeros();
+    let mut eliminated = Vec::with_capacity(equations.len());
+    for one in equations {
+        let mut damped = one.clone();
+        for i in 0..damped.place.nrows() {
+            damped.place[(i, i)] *= 1.0 + damping;
+        }
+        let elimination = Elimination::of(&damped)?;
+        left += elimination.left;
+        let known = elimination.place.solve(&damped.place_side);
+        side += damped.shared_side - as_shared(&(damped.both.transpose() * &known));
+        eliminated.push((elimination, damped));
+    }
+    let shared = if free.count() == 0 {
+        SVector::zeros()
+    } else {
+        for i in 0..SHARED {
+            let own: f64 = equations.iter().map(|one| one.shared[(i, i)]).sum();
+            left[(i, i)] += damping * own;
+            // What is not free is told by nothing, whatever rounding leaves of it.
+            if !free.has(i) {
+                left[(i, i)] = 0.0;
+            }
+        }
+        let shared = Factor::of_shared(&left)?.solve(&DVector::from_column_slice(side.as_slice()));
+        as_shared(&shared)
+    };
+    let along = DVector::from_column_slice(shared.as_slice());
+    let places = eliminated
+        .iter()
+        .map(|(elimination, damped)| {
+            elimination.place.solve(&(&damped.place_side - &damped.both * &along))
+        })
+        .collect();
+    Some(Step { shared, places })
+}
+
+fn as_shared(vector: &DVector<f64>) -> SVector<f64, SHARED> {
+    SVector::from_fn(|row, _| vector[row])
+}

@@ -1,0 +1,134 @@
+//! Which lens, and whether the board is bent: what foretells pictures best that took
+//! no part in the fit. A residual cannot decide that: it falls with every number
+//! that is fitted.
+
+use nalgebra::{DVector, SMatrix, SVector};
+
+use super::bundle::{self, Fit};
+use super::equations::{Elimination, Equations, Factor, Free, SHARED};
+use super::lens::Lens;
+use super::solve::{Views, only};
+
+/// Share of the smallest held-out error by which a lens may foretell worse and be
+/// taken for as good. Of those that are as good the one with the most coefficients is
+/// chosen, because a coefficient that is left out counts as known. The rational one
+/// must foretell better by as much: where its numerator and its denominator nearly
+/// cancel, its numbers are anywhere.
+const AS_GOOD: f64 = 0.005;
+/// Standard deviations from which on a bend of the board is believed.
+const BELIEVED_BEND: f64 = 4.0;
+
+/// What one choice gives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trial {
+    /// What was fitted.
+    pub free: Free,
+    /// Root mean square of all reprojection errors \[px\].
+    pub rms_px: f64,
+    /// The same of pictures that took no part in fitting the camera, each left out
+    /// once \[px\]; `None` where the others do not settle the camera.
+    pub held_out_px: Option<f64>,
+}
+
+/// The best choice and all that was tried. `None` where no lens leads to a camera.
+pub(super) fn best(views: &Views) -> Option<(Fit, Free, Vec<Trial>)> {
+    let mut fits: Vec<(Fit, Trial)> = Vec::new();
+    for lens in Lens::ALL {
+        let start = fits
+            .last()
+            .map_or_else(|| views.start.clone(), |(fit, _)| (fit.model, fit.places.clone()));
+        let free = Free { lens: Some(lens), bend: false };
+        if let Some(fit) = bundle::fit(start, free, &views.boards) {
+            let trial = trial(views, &fit, free);
+            fits.push((fit, trial));
+        }
+    }
+    let simpler = fits.iter().filter(|(_, trial)| trial.free.lens < Some(Lens::Rational));
+    let least_of_simpler =
+        simpler.filter_map(|(_, trial)| trial.held_out_px).fold(f64::INFINITY, f64::min);
+    let least =
+        fits.iter().filter_map(|(_, trial)| trial.held_out_px).fold(f64::INFINITY, f64::min);
+    let as_good = |trial: &Trial| {
+        let is_rational = trial.free.lens == Some(Lens::Rational);
+        let best =
+            if is_rational { least_of_simpler * (1.0 - AS_GOOD) } else { least * (1.0 + AS_GOOD) };
+        trial.held_out_px.is_some_and(|px| px <= best)
+    };
+    // Where nothing can be held out, the fewest coefficients.
+    let flat = fits.iter().rposition(|(_, trial)| as_good(trial)).unwrap_or(0);
+    let mut trials: Vec<Trial> = fits.iter().map(|(_, trial)| *trial).collect();
+    if flat >= fits.len() {
+        return None;
+    }
+    let (fit, chosen) = fits.swap_remove(flat);
+    let free = Free { bend: true, ..chosen.free };
+    let bent = bundle::fit((fit.model, fit.places.clone()), free, &views.boards)
+        .map(|fit| (trial(views, &fit, free), fit));
+    if let Some((trial, bent)) = bent {
+        trials.push(trial);
+        let foretells = trial.held_out_px.zip(chosen.held_out_px).is_some_and(|(b, f)| b < f);
+        if foretells && is_bent(views, &bent, free) {
+            return Some((bent, free, trials));
+        }
+    }
+    Some((fit, chosen.free, trials))
+}
+
+/// A fit with a lens that is given, by way of the simpler ones.
+pub(super) fn up_to(views: &Views, lens: Lens) -> Option<(Fit, Trial)> {
+    let mut start = views.start.clone();
+    for simpler in Lens::ALL.into_iter().take_while(|simpler| *simpler < lens) {
+        let free = Free { lens: Some(simpler), bend: false };
+        if let Some(fit) = bundle::fit(start.clone(), free, &views.boards) {
+            start = (fit.model, fit.places);
+        }
+    }
+    let free = Free { lens: Some(lens), bend: false };
+    let fit = bundle::fit(start, free, &views.boards)?;
+    let trial = trial(views, &fit, free);
+    Some((fit, trial))
+}
+
+fn is_bent(views: &Views, fit: &Fit, free: Free) -> bool {
+    let (Some(variance), Some(spreads)) =
+        (Some(views.noise_variance_px2(fit, free)), views.spreads(fit, free))
+    else {
+        return false;
+    };
+    let sigma = |side: usize| spreads[SHARED - 2 + side] * variance.sqrt();
+    (0..2).any(|side| fit.model.bend_mm[side].abs() > BELIEVED_BEND * sigma(side))
+}
+
+fn trial(views: &Views, fit: &Fit, free: Free) -> Trial {
+    let rms_px = views.rms_px(fit.squares_px2);
+    Trial { free, rms_px, held_out_px: held_out_px(views, fit, free) }
+}
+
+/// Root mean square error of each picture with the camera that the others give and
+/// its own pose fitted \[px\].
+///
+/// To first order in what one picture moves the camera: at the best fit the others
+/// together pull as one picture pulls against them, so that without it the camera
+/// goes by ds = −(S − Sᵥ)⁻¹gᵥ, with S all pictures' equations, poses eliminated, and
+/// Sᵥ and gᵥ its own; of its errors that leaves |r|² + 2 gᵥᵀ(S − Sᵥ)⁻¹gᵥ + dsᵀSᵥds.
+fn held_out_px(views: &Views, fit: &Fit, free: Free) -> Option<f64> {
+    let mut all = SMatrix::<f64, SHARED, SHARED>::zeros();
+    let mut each = Vec::with_capacity(fit.places.len());
+    for (place, boards) in fit.places.iter().zip(&views.boards) {
+        let equations = Equations::of(&fit.model, free, place, boards)?;
+        let elimination = Elimination::of(&equations)?;
+        let known = elimination.place.solve(&equations.place_side);
+        let pull = DVector::from_column_slice(equations.shared_side.as_slice())
+            - equations.both.transpose() * known;
+        all += elimination.left;
+        each.push((elimination.left, pull, equations.squares_px2));
+    }
+    let mut squares = 0.0;
+    for (own, pull, own_squares) in each {
+        let rest = Factor::of_shared(&only(all - own, free))?;
+        let moved = rest.solve(&pull);
+        let fixed = SVector::<f64, SHARED>::from_fn(|row, _| moved[row]);
+        squares += own_squares + 2.0 * pull.dot(&moved) + (fixed.transpose() * own * fixed)[0];
+    }
+    Some(views.rms_px(squares))
+}

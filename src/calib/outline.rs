@@ -1,0 +1,113 @@
+//! Whether a checkerboard ends where it should: a larger board than the one that was
+//! told contains the smaller one, and every corner of it fits, but its origin and its
+//! counts are wrong.
+
+use super::board::Board;
+use super::grey::Grey;
+use crate::frame::Frame;
+use crate::geometry::ImagePoint;
+
+/// Difference between squares of both colours from which on a row of squares belongs
+/// to a board, as a share of that between the squares within.
+const GOES_ON: f64 = 0.5;
+/// Squares of a row that must lie in the picture for it to tell.
+const FEWEST: usize = 3;
+/// A square's colour is the mean of so many places along each of its sides, well
+/// within it.
+const PLACES: u32 = 3;
+
+/// A side of the board in the order of its corners.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Before the first column.
+    FirstColumn,
+    /// After the last column.
+    LastColumn,
+    /// Before the first row.
+    FirstRow,
+    /// After the last row.
+    LastRow,
+}
+
+impl Side {
+    const ALL: [Self; 4] = [Self::FirstColumn, Self::LastColumn, Self::FirstRow, Self::LastRow];
+}
+
+/// The sides beyond which the board goes on for a further row of squares.
+pub fn goes_on(board: &Board, frame: &Frame, corners: &[ImagePoint]) -> Vec<Side> {
+    let (columns, rows) = board.corners();
+    if corners.len() != columns * rows {
+        return Vec::new();
+    }
+    let grey = Grey::of(frame);
+    let at = |column: usize, row: usize| corners[row * columns + column];
+    let inner = (0..(columns - 1) * (rows - 1)).filter_map(|i| {
+        let (column, row) = (i % (columns - 1), i / (columns - 1));
+        let square =
+            [at(column, row), at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)];
+        Some((column + row, colour(&grey, square)?))
+    });
+    let Some(contrast) = difference(inner) else { return Vec::new() };
+    Side::ALL
+        .into_iter()
+        .filter(|side| {
+            let line = |depth: usize, along: usize| match side {
+                Side::FirstColumn => at(depth, along),
+                Side::LastColumn => at(columns - 1 - depth, along),
+                Side::FirstRow => at(along, depth),
+                Side::LastRow => at(along, rows - 1 - depth),
+            };
+            let count =
+                if matches!(side, Side::FirstColumn | Side::LastColumn) { rows } else { columns };
+            let beyond: Vec<[ImagePoint; 2]> = (0..count)
+                .map(|along| beyond([line(0, along), line(1, along), line(2, along)]))
+                .collect();
+            let squares = beyond.windows(2).enumerate();
+            let colours: Vec<(usize, f64)> = squares
+                .filter_map(|(along, pair)| {
+                    let square = [pair[0][0], pair[0][1], pair[1][0], pair[1][1]];
+                    Some((along, colour(&grey, square)?))
+                })
+                .collect();
+            colours.len() >= FEWEST
+                && difference(colours.into_iter())
+                    .is_some_and(|d| d.abs() > GOES_ON * contrast.abs())
+        })
+        .collect()
+}
+
+/// The next two corners after three along a line, going outwards; the first two of
+/// the three are the outermost. To the second order, for the lens and the tilt.
+fn beyond([outer, next, third]: [ImagePoint; 3]) -> [ImagePoint; 2] {
+    let extend = |a: ImagePoint, b: ImagePoint, c: ImagePoint| {
+        ImagePoint::from(a.coords * 3.0 - b.coords * 3.0 + c.coords)
+    };
+    let first = extend(outer, next, third);
+    [first, extend(first, outer, next)]
+}
+
+/// Mean grey value well within a square, given row by row; `None` where it leaves the
+/// picture.
+fn colour(grey: &Grey<'_>, square: [ImagePoint; 4]) -> Option<f64> {
+    let [above, below] = [[square[0], square[1]], [square[2], square[3]]];
+    let between = |ends: [ImagePoint; 2], part: f64| ends[0] + (ends[1] - ends[0]) * part;
+    let part = |k: u32| 0.3 + 0.4 * f64::from(k) / f64::from(PLACES - 1);
+    let mut sum = 0.0;
+    for i in 0..PLACES * PLACES {
+        let (right, down) = (part(i % PLACES), part(i / PLACES));
+        sum += grey.at(between([between(above, right), between(below, right)], down))?;
+    }
+    Some(sum / f64::from(PLACES * PLACES))
+}
+
+/// Mean of the even squares less that of the odd ones.
+fn difference(squares: impl Iterator<Item = (usize, f64)>) -> Option<f64> {
+    let mut sums = [(0.0, 0.0); 2];
+    for (number, value) in squares {
+        let (sum, count) = &mut sums[number % 2];
+        *sum += value;
+        *count += 1.0;
+    }
+    let [even, odd] = sums.map(|(sum, count)| sum / count);
+    Some(even - odd).filter(|difference| difference.is_finite())
+}

@@ -1,0 +1,325 @@
+//! What one picture shows of the board, and why some pictures are not used.
+
+use super::board::{Board, NotABoard, Seen, all_seen};
+use super::corner;
+use super::focus::{Focus, Unsharp};
+use super::outline::{self, Side};
+use crate::bridge::{self, BridgeError};
+use crate::frame::Frame;
+
+/// Mean shift of the corners below which two pictures show the board in one place
+/// \[px\]: they say the same twice, and count as one.
+const SAME_PLACE_PX: f64 = 1.0;
+
+/// The board as one picture shows it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sighting {
+    /// The picture's name.
+    pub name: String,
+    /// Its size \[px\].
+    pub image_size_px: [u32; 2],
+    /// The inner corners that were found.
+    pub corners: Vec<Seen>,
+    /// How sharp they are, where that could be told.
+    pub focus: Option<Focus>,
+}
+
+/// Why a picture is not used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// It cannot be read.
+    #[error("unreadable: {0}")]
+    Unreadable(String),
+    /// The board, all of it, is not to be seen.
+    #[error("no board with {columns}x{rows} inner corners")]
+    NoBoard {
+        /// Inner corners along a row.
+        columns: usize,
+        /// Inner corners along a column.
+        rows: usize,
+    },
+    /// A board with other counts.
+    #[error(
+        "a board with {}x{} inner corners shows, not one with {}x{}: see that all of it is in \
+         the picture, or correct --board",
+        found.0, found.1, expected.0, expected.1
+    )]
+    OtherBoard {
+        /// Inner corners that show, along a row and along a column.
+        found: (usize, usize),
+        /// Those of the board that was told.
+        expected: (usize, usize),
+    },
+    /// A larger board, of which the one that was told would be a part.
+    #[error(
+        "the board goes on beyond {columns}x{rows} inner corners, {}: count again and correct \
+         --board", sides_text(.sides)
+    )]
+    Larger {
+        /// Inner corners along a row that were told.
+        columns: usize,
+        /// Inner corners along a column.
+        rows: usize,
+        /// Where it goes on.
+        sides: Vec<Side>,
+    },
+    /// Something like a board, but not one.
+    #[error("no sound board: {0}")]
+    NotABoard(#[from] NotABoard),
+    /// Out of focus.
+    #[error(
+        "blurred by {blur_px:.1} px: focus the lens on the board, and calibrate with that focus"
+    )]
+    Blurred {
+        /// Standard deviation of the blur \[px\].
+        blur_px: f64,
+    },
+    /// Taken in motion.
+    #[error(
+        "the board moved by {way_px:.1} px during the exposure: hold it still, or expose shorter"
+    )]
+    Moved {
+        /// How far \[px\].
+        way_px: f64,
+    },
+    /// The board is where it was in another picture.
+    #[error("the board is where it is in {of} (within {shift_px:.1} px), which says nothing new")]
+    Duplicate {
+        /// The other picture's name.
+        of: String,
+        /// Mean shift of the corners \[px\].
+        shift_px: f64,
+    },
+    /// It is not of the size that most others have.
+    #[error("size {found}, while most are {expected}", found = size_text(*.found), expected = size_text(*.expected))]
+    Size {
+        /// Its size \[px\].
+        found: [u32; 2],
+        /// The size of most pictures \[px\].
+        expected: [u32; 2],
+    },
+    /// OpenCV gave up on it.
+    #[error(transparent)]
+    Bridge(#[from] BridgeError),
+}
+
+fn size_text([width, height]: [u32; 2]) -> String {
+    format!("{width}x{height} px")
+}
+
+fn sides_text(sides: &[Side]) -> String {
+    let words = sides.iter().map(|side| match side {
+        Side::FirstColumn => "before the first column",
+        Side::LastColumn => "after the last column",
+        Side::FirstRow => "before the first row",
+        Side::LastRow => "after the last row",
+    });
+    words.collect::<Vec<_>>().join(" and ")
+}
+
+/// Looks for the board in a picture.
+pub fn look(board: &Board, name: &str, frame: &Frame) -> Result<Sighting, Refusal> {
+    let expected = board.corners();
+    let (columns, rows) = expected;
+    let Some(corners) = bridge::find_board(frame, expected)? else {
+        return Err(match bridge::find_any_board(frame)? {
+            Some(found) if turned_like(found, expected) != expected => {
+                Refusal::OtherBoard { found: turned_like(found, expected), expected }
+            }
+            _ => Refusal::NoBoard { columns, rows },
+        });
+    };
+    let corners = board.order(corners)?;
+    let sides = outline::goes_on(board, frame, &corners);
+    if !sides.is_empty() {
+        return Err(Refusal::Larger { columns, rows, sides });
+    }
+    let corners = corner::refine(board, frame, &corners);
+    let focus = Focus::of(board, frame, &corners);
+    match focus.and_then(|focus| focus.fault()) {
+        Some(Unsharp::Blurred { blur_px }) => return Err(Refusal::Blurred { blur_px }),
+        Some(Unsharp::Moved { way_px }) => return Err(Refusal::Moved { way_px }),
+        None => {}
+    }
+    let side = |px: usize| u32::try_from(px).unwrap_or(u32::MAX);
+    let image_size_px = [side(frame.width()), side(frame.height())];
+    Ok(Sighting { name: name.to_owned(), image_size_px, corners: all_seen(&corners), focus })
+}
+
+/// The longer side first if it is so on the other board: a plain board does not tell
+/// its rows from its columns.
+fn turned_like((a, b): (usize, usize), (columns, rows): (usize, usize)) -> (usize, usize) {
+    if (a >= b) == (columns >= rows) { (a, b) } else { (b, a) }
+}
+
+/// What became of pictures, each with its name.
+pub type Looks = Vec<(String, Result<Sighting, Refusal>)>;
+
+/// Keeps the size that most pictures have, the earlier one if two are as
+/// common, and refuses the others.
+pub fn agree_on_size(looks: &mut Looks) {
+    let sizes: Vec<[u32; 2]> =
+        looks.iter().filter_map(|(_, look)| look.as_ref().ok()).map(|s| s.image_size_px).collect();
+    let count = |size: &[u32; 2]| sizes.iter().filter(|other| *other == size).count();
+    // `max_by_key` keeps the last of equals, so it is asked from the end.
+    let Some(expected) = sizes.iter().rev().max_by_key(|size| count(size)).copied() else {
+        return;
+    };
+    for (_, look) in looks {
+        if let Ok(Sighting { image_size_px: found, .. }) = look
+            && *found != expected
+        {
+            *look = Err(Refusal::Size { found: *found, expected });
+        }
+    }
+}
+
+/// Keeps one of the pictures that show the board in one place, the first, and refuses
+/// the others.
+pub fn take_out_duplicates(looks: &mut Looks) {
+    for later in 1..looks.len() {
+        let Ok(sighting) = &looks[later].1 else { continue };
+        let twin = looks[..later].iter().find_map(|(_, look)| {
+            let earlier = look.as_ref().ok()?;
+            let shift_px = shift_px(earlier, sighting)?;
+            (shift_px < SAME_PLACE_PX).then(|| (earlier.name.clone(), shift_px))
+        });
+        if let Some((of, shift_px)) = twin {
+            looks[later].1 = Err(Refusal::Duplicate { of, shift_px });
+        }
+    }
+}
+
+/// Mean distance between the corners that two pictures share \[px\], whichever way
+/// round a plain board was counted. `None` without such corners.
+pub fn shift_px(a: &Sighting, b: &Sighting) -> Option<f64> {
+    let (first, last) = (a.corners.first()?.index, a.corners.last()?.index);
+    let straight = mean_distance(a, b, |index| index);
+    let turned = mean_distance(a, b, |index| (first + last).wrapping_sub(index));
+    [straight, turned].into_iter().flatten().reduce(f64::min)
+}
+
+fn mean_distance(a: &Sighting, b: &Sighting, of: impl Fn(usize) -> usize) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for corner in &a.corners {
+        let index = of(corner.index);
+        if let Ok(other) = b.corners.binary_search_by_key(&index, |other| other.index) {
+            sum += (b.corners[other].px - corner.px).norm();
+            count += 1.0;
+        }
+    }
+    (count > 0.0).then(|| sum / count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calib::Camera;
+    use crate::calib::synthetic::{self, poses};
+    use crate::frame::Pixels;
+    use crate::geometry::Pose;
+    use crate::sim::boards::{BoardStudio, Exposure};
+    use crate::time::Stamp;
+    use crate::units::Mm;
+    use nalgebra::{Vector2, Vector3};
+
+    fn board(columns: usize, rows: usize) -> Board {
+        Board::new(columns, rows, Mm::constant(20.0)).unwrap()
+    }
+
+    /// What is said of a picture of a board, where one of 9x6 is looked for.
+    fn seen(shown: &Board, exposure: Exposure) -> Result<Sighting, Refusal> {
+        let camera =
+            Camera::pinhole([620.0, 622.0], [263.0, 198.0]).with_five([-0.2, 0.05, 0.0, 0.0, 0.0]);
+        let (columns, rows) = shown.corners();
+        #[expect(clippy::cast_precision_loss, reason = "a handful of corners")]
+        let middle = Vector3::new(columns as f64 - 1.0, rows as f64 - 1.0, 0.0) * 10.0;
+        let pose =
+            Pose::new(Vector3::new(0.2, -0.15, 0.05), Vector3::new(0.0, 0.0, 420.0) - middle);
+        let frame = BoardStudio::new(&camera, [520, 400]).take(shown, &pose, exposure, 3).unwrap();
+        look(&board(9, 6), "a.png", &frame)
+    }
+
+    #[test]
+    fn a_sharp_board_is_seen_with_its_blur() {
+        let sighting = seen(&board(9, 6), Exposure::SHARP).unwrap();
+        assert_eq!(sighting.corners.len(), 54);
+        assert_eq!(sighting.image_size_px, [520, 400]);
+        let focus = sighting.focus.unwrap();
+        // The lens's 0.7 px, the pixel's own width, and what reading between pixels adds.
+        for blur in [focus.along_rows_px, focus.along_columns_px] {
+            assert!((0.7..1.1).contains(&blur), "{focus:?}");
+        }
+    }
+
+    #[test]
+    fn other_boards_are_told_from_none() {
+        let said = seen(&board(7, 5), Exposure::SHARP).unwrap_err().to_string();
+        assert!(said.contains("x5 inner corners shows") || said.contains("x7 inner"), "{said}");
+        assert!(said.contains("not one with 9x6"), "{said}");
+        let larger = seen(&board(11, 8), Exposure::SHARP).unwrap_err();
+        assert!(
+            matches!(larger, Refusal::Larger { .. } | Refusal::OtherBoard { found: (11, 8), .. }),
+            "{larger}"
+        );
+        let longer = seen(&board(10, 6), Exposure::SHARP).unwrap_err();
+        assert!(matches!(longer, Refusal::Larger { .. } | Refusal::OtherBoard { .. }), "{longer}");
+        let empty =
+            Frame::new(0, Stamp::START, (400, 300), Pixels::Grey8(vec![90; 400 * 300])).unwrap();
+        let none = look(&board(9, 6), "a.png", &empty).unwrap_err();
+        assert_eq!(none, Refusal::NoBoard { columns: 9, rows: 6 });
+    }
+
+    #[test]
+    fn blur_is_told_from_motion() {
+        let blurred = Exposure { blur_px: 5.0, ..Exposure::SHARP };
+        let Err(Refusal::Blurred { blur_px }) = seen(&board(9, 6), blurred) else {
+            panic!("a blurred board is seen");
+        };
+        assert!((4.0..6.0).contains(&blur_px), "{blur_px}");
+        let moved = Exposure { way_px: Vector2::new(9.0, 0.0), ..Exposure::SHARP };
+        let Err(Refusal::Moved { way_px }) = seen(&board(9, 6), moved) else {
+            panic!("a moving board is seen");
+        };
+        assert!((7.0..11.0).contains(&way_px), "{way_px}");
+        let little = Exposure { way_px: Vector2::new(1.5, 1.0), ..Exposure::SHARP };
+        assert!(seen(&board(9, 6), little).is_ok());
+    }
+
+    #[test]
+    fn a_board_that_was_seen_in_its_place_already_counts_once() {
+        let at = |name: &str, pose: &Pose| {
+            (name.to_owned(), Ok(synthetic::sighting(name, pose, || 0.0)))
+        };
+        let first = poses()[0];
+        let by = |mm: f64| {
+            Pose::from_parts(first.rotation(), first.translation_mm() + Vector3::x() * mm)
+        };
+        let mut looks = vec![at("a", &first), at("b", &by(0.1)), at("c", &by(2.0))];
+        // The same board, counted from its other end.
+        let mut turned = synthetic::sighting("d", &first, || 0.0);
+        let places: Vec<_> = turned.corners.iter().rev().map(|corner| corner.px).collect();
+        turned.corners = all_seen(&places);
+        looks.push(("d".to_owned(), Ok(turned)));
+        take_out_duplicates(&mut looks);
+        let said: Vec<bool> = looks.iter().map(|look| look.1.is_ok()).collect();
+        assert_eq!(said, [true, false, true, false]);
+        let words = looks[1].1.as_ref().unwrap_err().to_string();
+        assert_eq!(words, "the board is where it is in a (within 0.3 px), which says nothing new");
+    }
+
+    #[test]
+    fn pictures_of_another_size_are_refused() {
+        let mut looks: Looks = poses()
+            .iter()
+            .map(|pose| ("x".to_owned(), Ok(synthetic::sighting("x", pose, || 0.0))))
+            .collect();
+        if let Ok(odd) = &mut looks[1].1 {
+            odd.image_size_px = [540, 720];
+        }
+        agree_on_size(&mut looks);
+        let said = looks[1].1.as_ref().unwrap_err().to_string();
+        assert_eq!(said, "size 540x720 px, while most are 720x540 px");
+        assert_eq!(looks.iter().filter(|look| look.1.is_ok()).count(), 11);
+    }
+}
