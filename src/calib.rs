@@ -25,6 +25,7 @@ pub mod sighting;
 pub mod solve;
 #[cfg(test)]
 mod synthetic;
+pub mod verify;
 
 pub use camera::Camera;
 pub use model::{Calibration, Quality, SurfaceMap};

@@ -18,6 +18,7 @@ macro_rules! say {
 }
 
 pub mod accuracy;
+pub mod board;
 pub mod calibrate;
 pub mod cell;
 pub mod check;
@@ -30,6 +31,7 @@ pub mod reproduce;
 pub mod robot_sim;
 pub mod run;
 pub mod simulate;
+pub mod verify;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -68,6 +70,8 @@ enum Command {
     Run(run::RunArgs),
     Process(process::ProcessArgs),
     Calibrate(calibrate::CalibrateArgs),
+    Board(board::SheetArgs),
+    Verify(verify::VerifyArgs),
     Simulate(simulate::SimulateArgs),
     Render(render::RenderArgs),
     RobotSim(robot_sim::RobotSimArgs),
@@ -106,6 +110,8 @@ pub fn main() -> ExitCode {
         Command::Demo(args) => demo::run(args, voice),
         Command::Run(args) => run::run(args, voice),
         Command::Process(args) => process::run(args, voice),
+        Command::Board(args) => board::run(args).map(|()| ExitCode::SUCCESS),
+        Command::Verify(args) => verify::run(args),
         Command::Calibrate(args) => calibrate::run(args),
         Command::Simulate(args) => simulate::run(args, voice),
         Command::Render(args) => render::run(args, voice).map(|()| ExitCode::SUCCESS),

@@ -19,6 +19,7 @@ pub mod report;
 pub mod reproduce;
 pub mod row;
 pub mod setup;
+pub mod sheet;
 pub mod stats;
 pub mod summary;
 #[cfg(test)]

@@ -9,7 +9,9 @@ use crate::geometry::ImagePoint;
 
 /// Difference between squares of both colours from which on a row of squares belongs
 /// to a board, as a share of that between the squares within.
-const GOES_ON: f64 = 0.5;
+const GOES_ON: f64 = 0.3;
+/// The same over the standard deviation of squares of one colour.
+const CLEARLY: f64 = 2.0;
 /// Squares of a row that must lie in the picture for it to tell.
 const FEWEST: usize = 3;
 /// A square's colour is the mean of so many places along each of its sides, well
@@ -33,11 +35,23 @@ impl Side {
     const ALL: [Self; 4] = [Self::FirstColumn, Self::LastColumn, Self::FirstRow, Self::LastRow];
 }
 
-/// The sides beyond which the board goes on for a further row of squares.
-pub fn goes_on(board: &Board, frame: &Frame, corners: &[ImagePoint]) -> Vec<Side> {
+/// Where a board does not end as it should.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Outline {
+    /// Beyond these sides it goes on for a further row of squares.
+    pub goes_on: Vec<Side>,
+    /// Beyond these there is no row of squares at all: what was taken for corners there
+    /// are the ends of the board's squares, or none.
+    pub ends_early: Vec<Side>,
+}
+
+/// Looks at the two rows of squares beyond each side; says nothing of a side where they
+/// leave the picture.
+pub fn look(board: &Board, frame: &Frame, corners: &[ImagePoint]) -> Outline {
+    let mut outline = Outline::default();
     let (columns, rows) = board.corners();
     if corners.len() != columns * rows {
-        return Vec::new();
+        return outline;
     }
     let grey = Grey::of(frame);
     let at = |column: usize, row: usize| corners[row * columns + column];
@@ -47,33 +61,54 @@ pub fn goes_on(board: &Board, frame: &Frame, corners: &[ImagePoint]) -> Vec<Side
             [at(column, row), at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)];
         Some((column + row, colour(&grey, square)?))
     });
-    let Some(contrast) = difference(inner) else { return Vec::new() };
-    Side::ALL
-        .into_iter()
-        .filter(|side| {
-            let line = |depth: usize, along: usize| match side {
-                Side::FirstColumn => at(depth, along),
-                Side::LastColumn => at(columns - 1 - depth, along),
-                Side::FirstRow => at(along, depth),
-                Side::LastRow => at(along, rows - 1 - depth),
-            };
-            let count =
-                if matches!(side, Side::FirstColumn | Side::LastColumn) { rows } else { columns };
-            let beyond: Vec<[ImagePoint; 2]> = (0..count)
-                .map(|along| beyond([line(0, along), line(1, along), line(2, along)]))
-                .collect();
-            let squares = beyond.windows(2).enumerate();
-            let colours: Vec<(usize, f64)> = squares
-                .filter_map(|(along, pair)| {
-                    let square = [pair[0][0], pair[0][1], pair[1][0], pair[1][1]];
-                    Some((along, colour(&grey, square)?))
-                })
-                .collect();
-            colours.len() >= FEWEST
-                && difference(colours.into_iter())
-                    .is_some_and(|d| d.abs() > GOES_ON * contrast.abs())
+    let Some((contrast, _)) = difference(inner) else { return outline };
+    for side in Side::ALL {
+        let line = |depth: usize, along: usize| match side {
+            Side::FirstColumn => at(depth, along),
+            Side::LastColumn => at(columns - 1 - depth, along),
+            Side::FirstRow => at(along, depth),
+            Side::LastRow => at(along, rows - 1 - depth),
+        };
+        let count =
+            if matches!(side, Side::FirstColumn | Side::LastColumn) { rows } else { columns };
+        // The outermost corner and the next two outwards.
+        let beyond: Vec<[ImagePoint; 3]> = (0..count)
+            .map(|along| {
+                let [first, second] = beyond([line(0, along), line(1, along), line(2, along)]);
+                [line(0, along), first, second]
+            })
+            .collect();
+        let alternate = |depth: usize| alternate(&grey, &beyond, depth, contrast);
+        if alternate(0) == Some(false) {
+            outline.ends_early.push(side);
+        } else if alternate(1) == Some(true) {
+            outline.goes_on.push(side);
+        }
+    }
+    outline
+}
+
+/// Whether the squares of a row beyond a side alternate as those within do. `None`
+/// where too few of them lie in the picture.
+fn alternate(
+    grey: &Grey<'_>,
+    beyond: &[[ImagePoint; 3]],
+    depth: usize,
+    contrast: f64,
+) -> Option<bool> {
+    let colours: Vec<(usize, f64)> = beyond
+        .windows(2)
+        .enumerate()
+        .filter_map(|(along, pair)| {
+            let square = [pair[0][depth], pair[0][depth + 1], pair[1][depth], pair[1][depth + 1]];
+            Some((along, colour(grey, square)?))
         })
-        .collect()
+        .collect();
+    if colours.len() < FEWEST {
+        return None;
+    }
+    let (difference, scatter) = difference(colours.into_iter())?;
+    Some(difference.abs() > (GOES_ON * contrast.abs()).max(CLEARLY * scatter))
 }
 
 /// The next two corners after three along a line, going outwards; the first two of
@@ -100,14 +135,19 @@ fn colour(grey: &Grey<'_>, square: [ImagePoint; 4]) -> Option<f64> {
     Some(sum / f64::from(PLACES * PLACES))
 }
 
-/// Mean of the even squares less that of the odd ones.
-fn difference(squares: impl Iterator<Item = (usize, f64)>) -> Option<f64> {
-    let mut sums = [(0.0, 0.0); 2];
+/// Mean of the even squares less that of the odd ones, and the standard deviation of
+/// squares of one kind.
+fn difference(squares: impl Iterator<Item = (usize, f64)>) -> Option<(f64, f64)> {
+    let mut sums = [(0.0, 0.0, 0.0); 2];
     for (number, value) in squares {
-        let (sum, count) = &mut sums[number % 2];
-        *sum += value;
+        let (count, sum, square) = &mut sums[number % 2];
         *count += 1.0;
+        *sum += value;
+        *square += value * value;
     }
-    let [even, odd] = sums.map(|(sum, count)| sum / count);
-    Some(even - odd).filter(|difference| difference.is_finite())
+    let [even, odd] = sums.map(|(count, sum, _)| sum / count);
+    let within = |(count, sum, square): (f64, f64, f64)| square - sum * sum / count;
+    let free = sums[0].0 + sums[1].0 - 2.0;
+    let scatter = ((within(sums[0]) + within(sums[1])).max(0.0) / free.max(1.0)).sqrt();
+    (even - odd).is_finite().then_some((even - odd, scatter))
 }

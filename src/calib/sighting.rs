@@ -3,7 +3,7 @@
 use super::board::{Board, NotABoard, Seen, all_seen};
 use super::corner;
 use super::focus::{Focus, Unsharp};
-use super::outline::{self, Side};
+use super::outline::{self, Outline, Side};
 use crate::bridge::{self, BridgeError};
 use crate::frame::Frame;
 
@@ -61,6 +61,19 @@ pub enum Refusal {
         /// Inner corners along a column.
         rows: usize,
         /// Where it goes on.
+        sides: Vec<Side>,
+    },
+    /// A smaller board, or something that looks like a corner of it.
+    #[error(
+        "no row of squares {} of {columns}x{rows} inner corners: count again and correct \
+         --board, or see that nothing covers the board", sides_text(.sides)
+    )]
+    Smaller {
+        /// Inner corners along a row that were told.
+        columns: usize,
+        /// Inner corners along a column.
+        rows: usize,
+        /// Where it ends.
         sides: Vec<Side>,
     },
     /// Something like a board, but not one.
@@ -130,9 +143,12 @@ pub fn look(board: &Board, name: &str, frame: &Frame) -> Result<Sighting, Refusa
         });
     };
     let corners = board.order(corners)?;
-    let sides = outline::goes_on(board, frame, &corners);
-    if !sides.is_empty() {
-        return Err(Refusal::Larger { columns, rows, sides });
+    let Outline { goes_on, ends_early } = outline::look(board, frame, &corners);
+    if !ends_early.is_empty() {
+        return Err(Refusal::Smaller { columns, rows, sides: ends_early });
+    }
+    if !goes_on.is_empty() {
+        return Err(Refusal::Larger { columns, rows, sides: goes_on });
     }
     let corners = corner::refine(board, frame, &corners);
     let focus = Focus::of(board, frame, &corners);

@@ -108,7 +108,7 @@ fn parse_board(text: &str) -> Result<(usize, usize), String> {
         .ok_or_else(|| "write columns x rows of inner corners, such as 9x6".to_owned())
 }
 
-fn parse_length(text: &str) -> Result<Mm, String> {
+pub(super) fn parse_length(text: &str) -> Result<Mm, String> {
     let value: f64 = text.trim().parse().map_err(|_| "expected a number of mm".to_owned())?;
     Mm::new(value).map_err(|error| error.to_string())
 }

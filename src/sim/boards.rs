@@ -16,6 +16,9 @@ const WHITE: f64 = 210.0;
 const AROUND: f64 = 120.0;
 /// White around the outer squares, in squares.
 const MARGIN: f64 = 0.8;
+/// Squares within or beyond the border of the squares from which on it has no part in a
+/// pixel.
+const FAR: f64 = 1.5;
 /// Variance of the mean over a pixel, which is even over its width \[px²\].
 const PIXEL: f64 = 1.0 / 12.0;
 
@@ -76,8 +79,8 @@ impl BoardStudio {
                 let below = to_next(width, i / width + 1 == height);
                 right.zip(below).map_or(AROUND, |(right, below)| scene.grey(at, right, below))
             });
-            let [off, _] = hash::normal_pair(hash::mix(&[seed, i as u64]));
-            rounded(grey + exposure.noise_grey * off)
+            let pair = hash::normal_pair(hash::mix(&[seed, i as u64 / 2]));
+            rounded(grey + exposure.noise_grey * pair[i % 2])
         });
         Frame::new(0, Stamp::START, self.size, Pixels::Grey8(values.collect()))
     }
@@ -120,6 +123,11 @@ impl Scene {
     /// so far off.
     fn grey(&self, ray: Point2<f64>, right: Vector2<f64>, below: Vector2<f64>) -> f64 {
         let Some(at) = self.on_board(ray) else { return AROUND };
+        // Squares from the sheet's middle and from its border.
+        let beyond = (at + Vector2::repeat(1.0) - self.squares / 2.0).abs() - self.squares / 2.0;
+        if beyond.max() > FAR {
+            return AROUND;
+        }
         let (Some(a), Some(b)) = (self.on_board(ray + right), self.on_board(ray + below)) else {
             return AROUND;
         };
@@ -135,6 +143,9 @@ impl Scene {
         let (u, v) = ((at.x, blur(0)), (at.y, blur(1)));
         let white = 0.5 * (WHITE + BLACK);
         let checker = white - 0.5 * (WHITE - BLACK) * wave(u) * wave(v);
+        if beyond.max() < -FAR {
+            return checker;
+        }
         // The origin is the first inner corner, one square within the board.
         let inside = |grow: f64| {
             let along = |(at, blur), squares: f64| {

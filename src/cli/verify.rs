@@ -1,0 +1,126 @@
+//! `truebead verify`: whether a calibration still holds.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, bail};
+use clap::Args;
+
+use super::WrongArguments;
+use super::calibrate::{BoardArgs, look_at, parse_length};
+use crate::calib::Calibration;
+use crate::calib::verify::{Findings, verify};
+use crate::io::calibration_file;
+use crate::units::Mm;
+
+/// Largest error of a width that is borne unless another is given \[%\].
+const MOST_PERCENT: f64 = 0.2;
+/// Standard deviations of what the calibration itself leaves that are borne, too.
+const STANDARD_DEVIATIONS: f64 = 3.0;
+/// A lens leaves so many times what it left when it was calibrated.
+const LENS_CHANGED: f64 = 2.0;
+/// A board that is further off its place than this is higher, and not the noise
+/// \[mm\].
+const HIGHER_MM: f64 = 0.3;
+
+/// Measures a board that lies on the bed, and says whether the calibration still holds.
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Example:
+  truebead verify today.png --board 9x6 --square-mm 20 --calibration calib.toml
+
+Lay the board flat on the bed, the robot where it was when the bed plane was
+fixed, and take one picture. Exit status 1 where the calibration does not hold
+any more.")]
+pub struct VerifyArgs {
+    /// Picture of the board on the bed
+    image: PathBuf,
+    #[command(flatten)]
+    board: BoardArgs,
+    /// Calibration file
+    #[arg(long, value_name = "FILE")]
+    calibration: PathBuf,
+    /// Height of the board's printed face above the bed [mm]
+    #[arg(long, value_name = "MM", default_value = "0", value_parser = parse_length)]
+    board_thickness_mm: Mm,
+    /// Largest error of a width that is borne [% of the width]
+    #[arg(long, value_name = "PERCENT", default_value_t = MOST_PERCENT)]
+    max_error_percent: f64,
+}
+
+/// Runs the command; the figures go to standard output.
+pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
+    let board = args.board.board()?;
+    if !(args.max_error_percent.is_finite() && args.max_error_percent > 0.0) {
+        let what =
+            format!("--max-error-percent: found {}, expected more than 0", args.max_error_percent);
+        return Err(WrongArguments::new(what).into());
+    }
+    if !args.image.is_file() {
+        let what = format!("{}: no such picture", args.image.display());
+        return Err(WrongArguments::new(what).into());
+    }
+    let calibration = calibration_file::read(&args.calibration)?;
+    let name = args.image.display().to_string();
+    let sighting = look_at(&board, &name, &args.image).with_context(|| name.clone())?;
+    if let Some(expected) = calibration.image_size_px()
+        && expected != sighting.image_size_px
+    {
+        let ([width, height], [right, bottom]) = (sighting.image_size_px, expected);
+        bail!(
+            "{name}: {width}x{height} px, but the calibration is for {right}x{bottom} px: take the \
+             picture as the camera was calibrated, or calibrate anew"
+        );
+    }
+    let found = verify(&calibration, &board, &sighting.corners, args.board_thickness_mm)
+        .map_err(anyhow::Error::from)
+        .with_context(|| name.clone())?;
+    let (rms_px, share) = match &calibration {
+        Calibration::Full { quality: Some(quality), .. } => {
+            (Some(quality.reprojection_rms_px), quality.width_sigma_share)
+        }
+        _ => (None, None),
+    };
+    let borne = (args.max_error_percent / 100.0).hypot(STANDARD_DEVIATIONS * share.unwrap_or(0.0));
+    let holds = found.worst_error.abs() <= borne;
+    tell(&found, args, borne, rms_px);
+    Ok(if holds { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn tell(found: &Findings, args: &VerifyArgs, borne: f64, rms_px: Option<f64>) {
+    let (column, row, length) = found.worst_at;
+    say!("a square measures {:.4} mm ({:+.3} %)", found.square_mm, 100.0 * found.scale_error);
+    say!(
+        "largest error of a width {:+.3} % ({:+.3} mm in {length:.0} mm, about column {column:.1}, \
+         row {row:.1} of the board's corners)",
+        100.0 * found.worst_error,
+        found.worst_error * length
+    );
+    say!("corners lie {:.3} mm off a true board (RMS)", found.rms_mm);
+    say!(
+        "by its size the board is {:+.2} mm above its place and tilted by {:.2}° against the bed",
+        found.height_mm,
+        found.tilt_deg
+    );
+    let before = rms_px.map_or_else(String::new, |px| format!(" ({px:.3} px when calibrated)"));
+    say!("reprojection error of the lens alone {:.3} px{before}", found.reprojection_rms_px);
+    if found.worst_error.abs() <= borne {
+        say!("HOLDS: no width is more than {:.3} % wrong", 100.0 * borne);
+        return;
+    }
+    say!("DOES NOT HOLD: a width is more than {:.3} % wrong", 100.0 * borne);
+    if rms_px.is_some_and(|px| found.reprojection_rms_px > LENS_CHANGED * px) {
+        say!("  the lens is not as it was: focus, zoom or the board's flatness; calibrate anew");
+    } else if found.height_mm.abs() > HIGHER_MM {
+        say!(
+            "  as if the board lay {:.2} mm {} than {} above the bed: see that the robot stands at \
+             the z of the bed plane's picture, and that --board-thickness-mm is right; otherwise \
+             the camera has moved, so take the bed plane anew (calibrate --plane)",
+            found.height_mm.abs(),
+            if found.height_mm > 0.0 { "higher" } else { "lower" },
+            args.board_thickness_mm
+        );
+    } else {
+        say!("  see that the squares have the size that was given, and that the board lies flat");
+    }
+}
