@@ -6,12 +6,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use nalgebra::Point2;
-use truebead::calib::Calibration;
+use nalgebra::{Point2, Rotation3, Vector2, Vector3};
 use truebead::calib::board::Board;
 use truebead::calib::sighting;
-use truebead::frame::Channel;
+use truebead::calib::{Calibration, Camera};
+use truebead::frame::{Channel, Frame};
+use truebead::geometry::Pose;
 use truebead::io::{calibration_file, image_file};
+use truebead::sim::boards::{BoardStudio, Exposure};
 use truebead::time::Stamp;
 use truebead::units::Mm;
 
@@ -108,4 +110,132 @@ fn pictures_without_a_board_end_with_1_and_say_which() {
     assert!(said.contains("black.png") && said.contains("no board with 9x6"), "{said}");
     assert!(said.contains("broken.png") && said.contains("unreadable"), "{said}");
     assert!(!out.exists());
+}
+
+const SIZE: [u32; 2] = [640, 480];
+
+fn camera() -> Camera {
+    Camera::pinhole([900.0, 901.0], [322.0, 236.0]).with_five([-0.15, 0.08, 4e-4, -3e-4, 0.0])
+}
+
+fn board(columns: usize, rows: usize) -> Board {
+    Board::new(columns, rows, Mm::constant(25.0)).unwrap()
+}
+
+/// Boards that are tilted to all sides; the last two lie on one plane.
+fn poses() -> Vec<Pose> {
+    let held = (0..10_u32).map(|i| {
+        let turn = f64::from(i) * 0.7;
+        let tilt = 0.25 + 0.04 * f64::from(i);
+        let rotation = Rotation3::new(Vector3::new(tilt * turn.cos(), tilt * turn.sin(), 0.05));
+        let middle = Vector3::new(40.0 * turn.sin(), 30.0 * turn.cos(), 560.0);
+        Pose::from_parts(rotation, middle - rotation * Vector3::new(100.0, 62.5, 0.0))
+    });
+    let flat = Rotation3::new(Vector3::new(0.1, -0.06, 0.0));
+    let lies = |x: f64, y: f64, turn: f64| {
+        let on_plane = Rotation3::from_axis_angle(&Vector3::z_axis(), turn);
+        let from_middle = on_plane * Vector3::new(100.0, 62.5, 0.0) + Vector3::new(x, y, 0.0);
+        Pose::from_parts(flat * on_plane, Vector3::new(0.0, 0.0, 520.0) - flat * from_middle)
+    };
+    held.chain([lies(0.0, 0.0, 0.0), lies(20.0, -12.0, 0.2)]).collect()
+}
+
+fn save(frame: &Frame, path: &Path) {
+    let (width, height) = (frame.width().try_into().unwrap(), frame.height().try_into().unwrap());
+    let picture = image::GrayImage::from_raw(width, height, frame.to_grey8().into_owned());
+    picture.unwrap().save(path).unwrap();
+}
+
+/// A folder with good pictures, and the studio they were taken in.
+fn pictures(folder: &Path) -> BoardStudio {
+    let studio = BoardStudio::new(&camera(), SIZE);
+    fs::create_dir(folder).unwrap();
+    for (pose, seed) in poses().iter().zip(0..) {
+        let frame = studio.take(&board(9, 6), pose, Exposure::SHARP, seed).unwrap();
+        save(&frame, &folder.join(format!("view{seed:02}.png")));
+    }
+    studio
+}
+
+fn said(run: &assert_cmd::assert::Assert) -> String {
+    String::from_utf8_lossy(&run.get_output().stdout).into_owned()
+}
+
+/// Every line of the table of bad pictures in `calib/README.md`.
+#[test]
+fn pictures_that_are_no_good_are_left_out_and_say_why() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path().join("pictures");
+    let studio = pictures(&folder);
+    let take = |board: &Board, exposure: Exposure, seed: u64| {
+        studio.take(board, &poses()[2], exposure, seed).unwrap()
+    };
+    let nine = board(9, 6);
+    let blurred = Exposure { blur_px: 6.0, ..Exposure::SHARP };
+    let moved = Exposure { way_px: Vector2::new(10.0, 0.0), ..Exposure::SHARP };
+    save(&take(&nine, blurred, 1), &folder.join("wrong-blurred.png"));
+    save(&take(&nine, moved, 2), &folder.join("wrong-moved.png"));
+    save(&take(&nine, Exposure::SHARP, 3), &folder.join("wrong-twin.png"));
+    save(&take(&board(7, 4), Exposure::SHARP, 4), &folder.join("wrong-small.png"));
+    save(&take(&board(9, 7), Exposure::SHARP, 5), &folder.join("wrong-large.png"));
+    image::GrayImage::new(640, 480).save(folder.join("wrong-empty.png")).unwrap();
+    fs::write(folder.join("wrong-file.png"), "no picture").unwrap();
+    let large = BoardStudio::new(&camera(), [720, 540]);
+    let frame = large.take(&nine, &poses()[4], Exposure::SHARP, 6).unwrap();
+    save(&frame, &folder.join("wrong-size.png"));
+    let out = scratch.path().join("calib.toml");
+    let plane = ["--plane", "view10.png", "--plane", "view11.png"];
+    let run = calibrate(&folder, &out, &plane).assert().success();
+    let said = said(&run);
+    for (picture, reason) in [
+        ("wrong-blurred.png", "blurred by "),
+        ("wrong-moved.png", "the board moved by "),
+        ("wrong-twin.png", "the board is where it is in view02.png (within 0."),
+        ("wrong-small.png", "a board with 7x4 inner corners shows, not one with 9x6"),
+        ("wrong-large.png", "9x7 inner corners shows|the board goes on beyond 9x6"),
+        ("wrong-empty.png", "no board with 9x6 inner corners"),
+        ("wrong-file.png", "unreadable: "),
+        ("wrong-size.png", "size 720x540 px, while most are 640x480 px"),
+    ] {
+        let line = said.lines().find(|line| line.starts_with(picture)).unwrap_or_default();
+        let is_told = reason.split('|').any(|reason| line.contains(reason));
+        assert!(is_told, "{picture}: no \"{reason}\" in\n{said}");
+    }
+    assert!(said.contains("12 of 20 images show the board"), "{said}");
+    assert!(said.contains("boards      2 on one plane, to 0.0"), "{said}");
+    let page = fs::read_to_string(scratch.path().join("report.html")).unwrap();
+    assert!(
+        page.contains("wrong-moved.png") && page.contains("What a width is known to"),
+        "{page}"
+    );
+    let Calibration::Full { camera: found, quality, .. } = calibration_file::read(&out).unwrap()
+    else {
+        unreachable!()
+    };
+    assert!((found.focal_px[0] - 900.0).abs() < 0.6, "{found:?}");
+    let quality = quality.unwrap();
+    assert!(quality.reprojection_rms_px < 0.03 && quality.width_sigma_share.unwrap() < 5e-4);
+    assert!(quality.seen_px.is_some() && quality.heights_mm.is_some());
+}
+
+#[test]
+fn a_calibration_passes_or_fails_by_what_it_leaves_in_a_width() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path().join("pictures");
+    pictures(&folder);
+    let out = scratch.path().join("calib.toml");
+    let bead = ["--bead-mm", "42", "--surface-height-mm", "20"];
+    let verdict = |limit: &str, code: i32| {
+        let more = [&bead[..], &["--max-width-sigma-mm", limit]].concat();
+        said(&calibrate(&folder, &out, &more).assert().code(code))
+    };
+    let passed = verdict("0.05", 0);
+    assert!(passed.contains("PASS: ") && passed.contains("of a bead of 42 mm"), "{passed}");
+    let failed = verdict("0.00001", 1);
+    assert!(failed.contains("FAIL: "), "{failed}");
+    // The file is there: what is enough for another bead is known.
+    assert!(out.exists());
+    for (name, value) in [("--max-width-sigma-mm", "0"), ("--bead-mm", "-4"), ("--bead-mm", "x")] {
+        calibrate(&folder, &out, &[&format!("{name}={value}")]).assert().code(2);
+    }
 }

@@ -99,8 +99,12 @@ fn the_calibrations_share_is_in_the_sigma_of_each_width_and_in_nothing_else() {
     let (mut cell, calibration) = scenario("tilted");
     let mut told = calibration.clone();
     let Calibration::Full { quality, .. } = &mut told else { unreachable!() };
-    *quality =
-        Some(Quality { reprojection_rms_px: 0.2, width_sigma_share: Some(SHARE), seen_px: None });
+    *quality = Some(Quality {
+        reprojection_rms_px: 0.2,
+        width_sigma_share: Some(SHARE),
+        seen_px: None,
+        heights_mm: None,
+    });
     let frame = Series::new(&cell, calibration.clone()).unwrap().render(0).unwrap().frame;
     for method in [Method::Caliper, Method::EdgeLines] {
         cell.gauge.method = method;

@@ -61,7 +61,8 @@ fn read_quality(table: &Table<'_>) -> Option<Quality> {
     let rms = table.number("reprojection_rms_px", RMS_PX);
     let width_sigma_share = table.optional_number("width_sigma_share", SHARE);
     let seen_px = table.optional_numbers::<4>("seen_px", CENTRE_PX);
-    Some(Quality { reprojection_rms_px: rms?, width_sigma_share, seen_px })
+    let heights_mm = table.optional_numbers::<2>("heights_mm", LENGTH_MM);
+    Some(Quality { reprojection_rms_px: rms?, width_sigma_share, seen_px, heights_mm })
 }
 
 #[expect(
@@ -164,6 +165,12 @@ pub fn to_toml(
                 "seen_px = {seen:?} # first column and row, last column and row where boards were seen"
             );
         }
+        if let Some(heights) = quality.heights_mm {
+            let _ = writeln!(
+                text,
+                "heights_mm = {heights:?} # lowest and highest corner of the boards above the bed"
+            );
+        }
     }
     text
 }
@@ -200,6 +207,7 @@ mod tests {
             reprojection_rms_px: 0.1234,
             width_sigma_share: Some(0.000_567),
             seen_px: Some([3.25, 4.0, 630.5, 470.125]),
+            heights_mm: Some([-1.5, 120.0]),
         });
         let notes = ["made by hand\nfor a test".to_string()];
         let text = to_toml((&camera, &bed), [640, 480], Mm::constant(12.5), quality, &notes);

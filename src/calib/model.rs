@@ -18,6 +18,8 @@ pub struct Quality {
     /// First column and row, last column and row between which boards were seen, and
     /// for which the share holds \[px\]. Files may lack it.
     pub seen_px: Option<[f64; 4]>,
+    /// Lowest and highest corner of the boards above the bed \[mm\]. Files may lack it.
+    pub heights_mm: Option<[f64; 2]>,
 }
 
 /// What a pixel means in millimetres.
@@ -113,6 +115,20 @@ impl SurfaceMap {
         self.image_size_px
     }
 
+    /// The same map with a surface whose height is known no better than this: a wrong
+    /// height is a wrong distance Z from the camera, and changes every width W by
+    /// W·Δh/Z. A map of one size for all pixels knows no height and stays as it is.
+    pub fn with_height_sigma(self, sigma: Mm) -> Self {
+        let Kind::Plane { bed, height_mm, .. } = &self.kind else { return self };
+        let above = bed.apply_inverse(Point3::origin()).z - height_mm;
+        let of_height = sigma.get() / above;
+        if of_height <= 0.0 || !of_height.is_finite() {
+            return self;
+        }
+        let share = self.width_sigma_share.unwrap_or(0.0).hypot(of_height);
+        Self { width_sigma_share: Some(share), ..self }
+    }
+
     /// Relative standard deviation that the calibration behind the map leaves
     /// in a width, the same error in every width; `None` where it is not known.
     pub fn width_sigma_share(&self) -> Option<f64> {
@@ -200,6 +216,22 @@ mod tests {
         let above = calibration.surface(Mm::constant(20.0), None);
         assert!((width_of_100_px(&on_bed) - 100.0 * 400.0 / 2500.0).abs() < 1e-9);
         assert!((width_of_100_px(&above) - 100.0 * 380.0 / 2500.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_height_that_is_not_known_well_covers_the_error_that_it_makes() {
+        let calibration = straight_down();
+        let believed = calibration.surface(Mm::constant(20.0), None);
+        let sigma = believed.with_height_sigma(Mm::constant(1.0)).width_sigma_share().unwrap();
+        let width = width_of_100_px(&believed);
+        for wrong in [19.0, 21.0] {
+            let truth = width_of_100_px(&calibration.surface(Mm::constant(wrong), None));
+            let error = (width - truth).abs() / width;
+            assert!((error / sigma - 1.0).abs() < 1e-6, "{error} {sigma}");
+        }
+        assert_eq!(believed.with_height_sigma(Mm::ZERO), believed);
+        let single = SurfaceMap::from_scale(0.1);
+        assert_eq!(single.with_height_sigma(Mm::constant(1.0)), single);
     }
 
     #[test]

@@ -94,6 +94,23 @@ impl Solution {
         &self.model.camera
     }
 
+    /// Lowest and highest corner of all boards above a bed \[mm\], to a tenth; `None`
+    /// without a board.
+    pub fn heights_mm(&self, board: &Board, bed: &Pose) -> Option<[f64; 2]> {
+        let corners = board.corners_mm();
+        let height = |pose: &Pose, i: usize| {
+            let at = corners.get(i)?;
+            Some(bed.apply_inverse(pose.apply(*at)).z)
+        };
+        let heights = || {
+            self.views.iter().flat_map(|view| {
+                view.corners.iter().filter_map(move |corner| height(&view.pose, corner.index))
+            })
+        };
+        let round = |mm: f64| (mm * 10.0).round() / 10.0;
+        Some([round(heights().reduce(f64::min)?), round(heights().reduce(f64::max)?)])
+    }
+
     /// The corners of a picture on the board.
     pub fn corners(&self, board: &Board, view: usize) -> Vec<Corner> {
         self.views.get(view).map_or_else(Vec::new, |view| board.place(&view.corners))

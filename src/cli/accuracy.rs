@@ -96,15 +96,16 @@ fn judge_calibrations(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
         output::make_folder(out)?;
     }
     let rigs = calibrations::rigs().context("the rigs' boards")?;
-    let kinds = [(Source::Corners, args.trials), (Source::Pictures, args.rendered_trials)];
-    let total = rigs.len() as u64 * (args.trials + args.rendered_trials);
+    let corners = rigs.iter().map(|rig| (rig, Source::Corners, args.trials));
+    let rendered = rigs.iter().filter(|rig| rig.rendered);
+    let pictures = rendered.map(|rig| (rig, Source::Pictures, args.rendered_trials));
+    let all: Vec<_> = corners.chain(pictures).collect();
+    let total = all.iter().map(|(.., trials)| trials).sum();
     let progress = Mutex::new(Progress::new("calibrating", "trials", Some(total), voice.quiet));
-    let mut figures = Vec::new();
-    for (source, trials) in kinds {
-        for rig in &rigs {
-            figures.push(judge_rig(rig, source, trials, &progress));
-        }
-    }
+    let figures: Vec<RigFigures> = all
+        .into_iter()
+        .map(|(rig, source, trials)| judge_rig(rig, source, trials, &progress))
+        .collect();
     progress.into_inner().unwrap_or_else(PoisonError::into_inner).finish();
     if let Some(out) = &args.out {
         let json = serde_json::to_vec_pretty(&figures).context("calibrations.json")?;

@@ -285,8 +285,12 @@ fn write(
             let [from, to] = covariance.seen_px();
             [from.x, from.y, to.x, to.y].map(|px| (px * 10.0).round() / 10.0)
         }),
+        heights_mm: None,
     };
-    let model = (solution.camera(), &plane.on_bed.bed(plane.thickness));
+    let bed = plane.on_bed.bed(plane.thickness);
+    let heights_mm = covariance.and_then(|_| solution.heights_mm(board, &bed));
+    let quality = Quality { heights_mm, ..quality };
+    let model = (solution.camera(), &bed);
     let (size, robot_z) = (solution.image_size_px, plane.robot_z);
     let text = file::to_toml(model, size, robot_z, Some(quality), &[note]);
     let name = args.out.display().to_string();

@@ -8,7 +8,7 @@ use anyhow::Context;
 use super::WrongArguments;
 use crate::calib::{Calibration, SurfaceMap};
 use crate::config::Cell;
-use crate::config::cell::{CalibrationSource, Mount, Purpose};
+use crate::config::cell::{CalibrationSource, Purpose};
 use crate::io::calibration_file;
 use crate::units::Mm;
 
@@ -58,8 +58,7 @@ impl LoadedCell {
     /// The map of the measured surface, for a camera that rides as the cell
     /// says, at the robot's present z.
     pub fn surface(&self, robot_z: Option<Mm>) -> SurfaceMap {
-        let z = if self.cell.mount == Some(Mount::Fixed) { None } else { robot_z };
-        self.calibration.surface(self.cell.surface_height, z)
+        self.cell.surface(&self.calibration, robot_z)
     }
 
     /// Calibration and height in words, for the head of a report.
@@ -72,7 +71,9 @@ impl LoadedCell {
                 format!("{mm_per_px} mm/px at the surface")
             }
             CalibrationSource::File(file) => {
-                format!("{}, surface {} above the bed", file.display(), self.cell.surface_height)
+                let (height, sigma) = (self.cell.surface_height, self.cell.surface_height_sigma);
+                let sigma = if sigma > Mm::ZERO { format!(" ± {sigma}") } else { String::new() };
+                format!("{}, surface {height}{sigma} above the bed", file.display())
             }
         }
     }

@@ -4,11 +4,13 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+use nalgebra::Point3;
 
 use super::cell::LoadedCell;
 use crate::calib::Calibration;
 use crate::config::Cell;
 use crate::config::cell::{Purpose, RunPart, Source};
+use crate::units::Mm;
 
 /// Validates a cell file and all it refers to.
 #[derive(Debug, Args)]
@@ -37,6 +39,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
             );
         }
     }
+    about_surface(&loaded);
     say!("  suffices for process, render");
     match Cell::parse(&args.cell, &loaded.text, Purpose::Run) {
         Ok(cell) => {
@@ -53,6 +56,44 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Tells where a cell uses a calibration beyond what it was made for.
+fn about_surface(loaded: &LoadedCell) {
+    let Calibration::Full { bed, quality, .. } = &loaded.calibration else { return };
+    let (height, roi) = (loaded.cell.surface_height, loaded.cell.gauge.roi);
+    let above = bed.apply_inverse(Point3::origin()).z - height.get();
+    if above <= 0.0 {
+        say!("  WARNING      the surface lies {:.1} mm above the camera", -above);
+        return;
+    }
+    say!(
+        "  height       1 mm of error in surface_height_mm makes {:.3} % of error in a width",
+        100.0 / above
+    );
+    if loaded.cell.surface_height_sigma == Mm::ZERO {
+        say!("               (surface_height_sigma_mm puts it into sigma_mm)");
+    }
+    let Some(quality) = quality else { return };
+    if let Some([low, high]) = quality.heights_mm
+        && !(low..=high).contains(&height.get())
+    {
+        say!(
+            "  WARNING      surface_height_mm: {height} lies outside the {low} to {high} mm above \
+             the bed at which boards were seen"
+        );
+    }
+    let Some([left, top, right, bottom]) = quality.seen_px else { return };
+    let ends = [roi.x, roi.y, roi.x + roi.width - 1, roi.y + roi.height - 1];
+    let [first_x, first_y, last_x, last_y] =
+        ends.map(|px| u32::try_from(px).map_or(f64::MAX, f64::from));
+    if first_x < left || first_y < top || last_x > right || last_y > bottom {
+        say!(
+            "  WARNING      gauge.roi_px reaches beyond where boards were seen, columns {left:.0} \
+             to {right:.0} and rows {top:.0} to {bottom:.0}; a width there is known less well than \
+             sigma_mm says"
+        );
+    }
 }
 
 fn about_run(run: &RunPart) {

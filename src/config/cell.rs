@@ -8,6 +8,7 @@ use super::control::{self, Control};
 use super::problem::Problems;
 use super::rendered::{self, Simulation};
 use super::table::{Document, Table};
+use crate::calib::{Calibration, SurfaceMap};
 use crate::control::limiter::Limits;
 use crate::frame::Channel;
 use crate::geometry::Roi;
@@ -37,6 +38,8 @@ pub struct Cell {
     pub calibration: CalibrationSource,
     /// Height of the measured layer's top edges above the bed.
     pub surface_height: Mm,
+    /// Standard deviation of that height.
+    pub surface_height_sigma: Mm,
     /// Where and how the bead is measured.
     pub gauge: Gauge,
     /// Channel of a colour image that is measured.
@@ -170,11 +173,23 @@ impl Cell {
     }
 }
 
+impl Cell {
+    /// The map of the measured surface, for a camera that rides as the cell says, at
+    /// the robot's present z.
+    pub fn surface(&self, calibration: &Calibration, robot_z: Option<Mm>) -> SurfaceMap {
+        let robot_z = robot_z.filter(|_| self.mount != Some(Mount::Fixed));
+        let map = calibration.surface(self.surface_height, robot_z);
+        map.with_height_sigma(self.surface_height_sigma)
+    }
+}
+
 fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let calibration = root.required_table("calibration");
     let calibration_source = calibration.as_ref().and_then(|t| read_calibration(t, folder));
     let surface_height =
         calibration.as_ref().and_then(|t| t.number_or("surface_height_mm", -1e4..=1e4, 0.0));
+    let height_sigma =
+        calibration.as_ref().and_then(|t| t.number_or("surface_height_sigma_mm", 0.0..=1e3, 0.0));
     let gauge_table = root.required_table("gauge");
     let gauge = gauge_table.as_ref().and_then(read_gauge);
     let channel = gauge_table.as_ref().and_then(read_channel);
@@ -199,6 +214,7 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     Some(Cell {
         calibration: calibration_source?,
         surface_height: Mm::new(surface_height?).ok()?,
+        surface_height_sigma: Mm::new(height_sigma?).ok()?,
         gauge: gauge?,
         channel: channel?,
         white: bit_depth.and_then(|bits| u16::try_from((1u32 << bits) - 1).ok()),

@@ -10,7 +10,6 @@ use crossbeam_channel::{Receiver, Sender, unbounded};
 use super::mailbox::Mailbox;
 use crate::calib::Calibration;
 use crate::config::Cell;
-use crate::config::cell::Mount;
 use crate::frame::Frame;
 use crate::geometry::ImagePoint;
 use crate::io::clock::RunClock;
@@ -159,7 +158,6 @@ fn measure_frames(mailbox: &Mailbox<Taken>, optics: &Optics, tap: &FrameTap, tel
 impl Optics {
     fn surface(&self) -> crate::calib::SurfaceMap {
         let z = Mm::new(f64::from_bits(self.robot_z.load(Ordering::Relaxed))).ok();
-        let z = z.filter(|_| self.cell.mount != Some(Mount::Fixed));
-        self.calibration.surface(self.cell.surface_height, z)
+        self.cell.surface(&self.calibration, z)
     }
 }

@@ -44,6 +44,8 @@ pub struct Rig {
     pub views: u64,
     /// Standard deviation of a corner's place in one direction \[px\].
     pub noise_px: f64,
+    /// Whether it is tried with rendered pictures, too: one rig a camera is.
+    pub rendered: bool,
 }
 
 /// One width that was calibrated for, measured at the true places of its edges.
@@ -87,15 +89,17 @@ pub fn rigs() -> Result<Vec<Rig>, BoardError> {
     let short = camera(533.0, [342.0, 234.0], [-0.28, 0.06, 1e-3, -2e-4]);
     let large = camera(1700.0, [650.0, 498.0], [-0.12, 0.08, -4e-4, 6e-4]);
     let board = |square: f64| Board::new(9, 6, Mm::new(square).unwrap_or(Mm::ZERO));
-    let rig = |name, camera, image_size_px, distance_mm, board, views, noise_px| Rig {
-        name,
-        camera,
-        image_size_px,
-        distance_mm,
-        board,
-        views,
-        noise_px,
-    };
+    let rig =
+        |name: &'static str, camera, image_size_px, distance_mm, board, views, noise_px| Rig {
+            name,
+            camera,
+            image_size_px,
+            distance_mm,
+            board,
+            views,
+            noise_px,
+            rendered: ["long-20", "short-13", "large-12"].contains(&name),
+        };
     let (small, medium) = ([640, 480], [720, 540]);
     Ok(vec![
         rig("long-20", long, medium, 400.0, board(7.0)?, 20, 0.05),
