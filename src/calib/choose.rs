@@ -43,24 +43,9 @@ pub(super) fn best(views: &Views) -> Option<(Fit, Free, Vec<Trial>)> {
             fits.push((fit, trial));
         }
     }
-    let simpler = fits.iter().filter(|(_, trial)| trial.free.lens < Some(Lens::Rational));
-    let least_of_simpler =
-        simpler.filter_map(|(_, trial)| trial.held_out_px).fold(f64::INFINITY, f64::min);
-    let least =
-        fits.iter().filter_map(|(_, trial)| trial.held_out_px).fold(f64::INFINITY, f64::min);
-    let as_good = |trial: &Trial| {
-        let is_rational = trial.free.lens == Some(Lens::Rational);
-        let best =
-            if is_rational { least_of_simpler * (1.0 - AS_GOOD) } else { least * (1.0 + AS_GOOD) };
-        trial.held_out_px.is_some_and(|px| px <= best)
-    };
-    // Where nothing can be held out, the fewest coefficients.
-    let flat = fits.iter().rposition(|(_, trial)| as_good(trial)).unwrap_or(0);
+    let chosen = chosen(&fits)?;
     let mut trials: Vec<Trial> = fits.iter().map(|(_, trial)| *trial).collect();
-    if flat >= fits.len() {
-        return None;
-    }
-    let (fit, chosen) = fits.swap_remove(flat);
+    let (fit, chosen) = fits.swap_remove(chosen);
     let free = Free { bend: true, ..chosen.free };
     let bent = bundle::fit((fit.model, fit.places.clone()), free, &views.boards)
         .map(|fit| (trial(views, &fit, free), fit));
@@ -72,6 +57,20 @@ pub(super) fn best(views: &Views) -> Option<(Fit, Free, Vec<Trial>)> {
         }
     }
     Some((fit, chosen.free, trials))
+}
+
+/// Which of the fits on a flat board is taken; where nothing can be held out the one
+/// with the fewest coefficients. `None` without a fit.
+fn chosen(fits: &[(Fit, Trial)]) -> Option<usize> {
+    let is_rational = |trial: &Trial| trial.free.lens == Some(Lens::Rational);
+    let held_out = |(_, trial): &(Fit, Trial)| trial.held_out_px;
+    let simpler = fits.iter().filter(|(_, trial)| !is_rational(trial));
+    let least = simpler.filter_map(held_out).fold(f64::INFINITY, f64::min);
+    let is_as_good = |fit: &(Fit, Trial)| {
+        let most = if is_rational(&fit.1) { 1.0 - AS_GOOD } else { 1.0 + AS_GOOD };
+        held_out(fit).is_some_and(|px| px <= most * least)
+    };
+    fits.iter().rposition(is_as_good).or_else(|| (!fits.is_empty()).then_some(0))
 }
 
 /// A fit with a lens that is given, by way of the simpler ones.

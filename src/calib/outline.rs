@@ -12,7 +12,7 @@ use crate::geometry::ImagePoint;
 const GOES_ON: f64 = 0.3;
 /// The same over the standard deviation of squares of one colour.
 const CLEARLY: f64 = 2.0;
-/// Squares of a row that must lie in the picture for it to tell.
+/// Squares of a row that must lie in the picture for it to tell, if it has as many.
 const FEWEST: usize = 3;
 /// A square's colour is the mean of so many places along each of its sides, well
 /// within it.
@@ -104,7 +104,7 @@ fn alternate(
             Some((along, colour(grey, square)?))
         })
         .collect();
-    if colours.len() < FEWEST {
+    if colours.len() < FEWEST.min(beyond.len() - 1) {
         return None;
     }
     let (difference, scatter) = difference(colours.into_iter())?;

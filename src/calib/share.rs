@@ -25,18 +25,6 @@ pub fn where_seen(covariance: &Covariance) -> Option<f64> {
     largest(covariance, &readings(covariance, covariance.seen_px()))
 }
 
-/// The same with beads of a third of the picture, anywhere in it, too. Where
-/// no corner held the distortion it is carried on, and a width may be known
-/// many times worse. `None` where some of the beads are seen nowhere on the
-/// surface.
-pub fn anywhere(covariance: &Covariance) -> Option<f64> {
-    let [right, bottom] = covariance.image_size_px().map(|px| f64::from(px) - 1.0);
-    let all = readings(covariance, [ImagePoint::origin(), ImagePoint::new(right, bottom)]);
-    let complete = all.len() == 2 * 2 * (PLACES * PLACES) as usize;
-    let most = largest(covariance, &all)?.max(where_seen(covariance)?);
-    complete.then_some(most)
-}
-
 /// Largest share of beads that were read.
 pub fn largest(covariance: &Covariance, readings: &[Reading]) -> Option<f64> {
     let share = |reading: &Reading| covariance.sigma(reading) / reading.value;

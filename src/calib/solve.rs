@@ -15,6 +15,9 @@ use crate::geometry::{ImagePoint, Pose};
 /// two poses fix the focal length only if nothing is wrong.
 pub const FEWEST_VIEWS: usize = 3;
 
+/// Reprojection error beyond which a fit is none \[px\].
+const MOST_RMS_PX: f64 = 3.0;
+
 /// No camera model can be found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SolveError {
@@ -32,6 +35,16 @@ pub enum SolveError {
     NoPose {
         /// The picture's name.
         name: String,
+    },
+    /// The corners are nowhere near where any camera would see them.
+    #[error(
+        "the corners are {rms_px:.1} px off where the best camera would see them, more than \
+         {MOST_RMS_PX} px: look for a wrong count of corners (--board), or pictures with another \
+         zoom or focus among them"
+    )]
+    NoFit {
+        /// Root mean square of the reprojection errors \[px\].
+        rms_px: f64,
     },
     /// The fit ended at something that is no camera.
     #[error(
@@ -207,6 +220,10 @@ impl Views {
         if focal_px.iter().any(|&f| f <= 0.0) {
             return Err(SolveError::NoCamera { focal_px });
         }
+        let rms_px = root_mean_square(fit.squares_px2, self.corners());
+        if rms_px > MOST_RMS_PX {
+            return Err(SolveError::NoFit { rms_px });
+        }
         let noise_px = self.noise_variance_px2(fit, free).sqrt();
         let spreads = self.spreads(fit, free).filter(|_| noise_px.is_finite());
         let views: Vec<View> = sightings
@@ -219,7 +236,7 @@ impl Views {
             free,
             sigma: spreads.map(|spreads| spreads.map(|spread| spread * noise_px)),
             image_size_px: self.size,
-            rms_px: root_mean_square(fit.squares_px2, self.corners()),
+            rms_px,
             held_out_px: trials.iter().find(|t| t.free == free).and_then(|t| t.held_out_px),
             noise_px,
             trials,

@@ -12,9 +12,11 @@ use super::{Calibration, SurfaceMap};
 use crate::geometry::Pose;
 use crate::units::Mm;
 
-/// Widths are compared over this part of the board's corners at least, so that the
-/// noise of two corners does not count as an error of the calibration.
+/// Widths are compared over this part of the board at least.
 const LEAST_PART: f64 = 0.3;
+/// Standard deviations that the noise of two corners may make of the error of their
+/// distance; there are hundreds of distances.
+const NOISE: f64 = 4.0;
 
 /// What a board on the bed says of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,9 +25,12 @@ pub struct Findings {
     pub square_mm: f64,
     /// That over its true side, less one.
     pub scale_error: f64,
-    /// The largest error of a distance along a row or a column, a third of the board
-    /// long or longer, as a share of the distance.
+    /// The error of the distance along a row or a column, 0.3 of the board long or
+    /// longer, that is furthest beyond what the corners' noise explains, as a share of
+    /// the distance.
     pub worst_error: f64,
+    /// How much of it the corners' noise may make, as a share of the distance.
+    pub noise: f64,
     /// Middle and length of that distance: column and row on the board, counted from
     /// 0, and mm.
     pub worst_at: (f64, f64, f64),
@@ -40,6 +45,14 @@ pub struct Findings {
     /// Root mean square of what is left between seen and expected corners with the best
     /// pose of the board \[px\]: the lens alone, wherever the board lies.
     pub reprojection_rms_px: f64,
+}
+
+impl Findings {
+    /// Whether no width is further off than this share of it, as far as the corners'
+    /// noise lets it be seen.
+    pub fn holds(&self, borne: f64) -> bool {
+        self.scale_error.abs() <= borne && self.worst_error.abs() - self.noise <= borne
+    }
 }
 
 /// Why a board says nothing of a calibration.
@@ -69,13 +82,14 @@ pub fn verify(
     let map = calibration.surface(thickness, None);
     let on_bed = places(&map, corners).ok_or(VerifyError::OffBed)?;
     let (scale, rms_mm) = similarity(board, corners, &on_bed).ok_or(VerifyError::OffBed)?;
-    let (worst_error, worst_at) = worst(board, corners, &on_bed);
     let (height_mm, tilt_deg, reprojection_rms_px) =
         lies(camera, bed, board, corners, thickness).ok_or(VerifyError::NoPose)?;
+    let (worst_error, noise, worst_at) = worst(board, corners, &on_bed, reprojection_rms_px);
     Ok(Findings {
         square_mm: scale * board.square().get(),
         scale_error: scale - 1.0,
         worst_error,
+        noise,
         worst_at,
         rms_mm,
         height_mm,
@@ -122,12 +136,17 @@ fn similarity(board: &Board, corners: &[Seen], on_bed: &[Point2<f64>]) -> Option
     scale.is_finite().then(|| (scale, (left / count).sqrt()))
 }
 
-/// The largest error of a distance along a row or a column, as a share, with where it
-/// is.
+/// The error of a distance along a row or a column that is furthest beyond its noise,
+/// as a share, with that noise and where it is.
 #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
-fn worst(board: &Board, corners: &[Seen], on_bed: &[Point2<f64>]) -> (f64, (f64, f64, f64)) {
+fn worst(
+    board: &Board,
+    corners: &[Seen],
+    on_bed: &[Point2<f64>],
+    rms_px: f64,
+) -> (f64, f64, (f64, f64, f64)) {
     let (columns, _) = board.corners();
-    let mut worst = (0.0_f64, (0.0, 0.0, 0.0));
+    let mut worst = (0.0_f64, f64::INFINITY, (0.0, 0.0, 0.0));
     for (i, a) in corners.iter().enumerate() {
         for (j, b) in corners.iter().enumerate().skip(i + 1) {
             let at = |index: usize| (index % columns, index / columns);
@@ -144,10 +163,12 @@ fn worst(board: &Board, corners: &[Seen], on_bed: &[Point2<f64>]) -> (f64, (f64,
             }
             let true_mm = along as f64 * board.square().get();
             let error = (on_bed[j] - on_bed[i]).norm() / true_mm - 1.0;
-            if error.abs() > worst.0.abs() {
+            // Two ends, each off by 1/√2 of the RMS along the way between them.
+            let noise = NOISE * rms_px / (b.px - a.px).norm();
+            if error.abs() - noise > worst.0.abs() - worst.1 {
                 let middle = |a: usize, b: usize| 0.5 * (a + b) as f64;
                 let place = (middle(column, other_column), middle(row, other_row), true_mm);
-                worst = (error, place);
+                worst = (error, noise, place);
             }
         }
     }
@@ -236,7 +257,7 @@ mod tests {
         assert!(found.reprojection_rms_px > 0.02, "{found:?}");
         assert!((found.scale_error + 0.0099).abs() < 0.002, "{found:?}");
         let (_, _, length) = found.worst_at;
-        assert!(length >= 40.0 && found.worst_error.abs() >= found.scale_error.abs());
+        assert!(length >= 40.0 && !found.holds(0.002) && found.holds(0.02));
     }
 
     #[test]

@@ -88,7 +88,7 @@ pub struct BoardArgs {
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = parse_board)]
     board: (usize, usize),
     /// Side of one square [mm]
-    #[arg(long, value_name = "MM", value_parser = parse_length)]
+    #[arg(long, value_name = "MM", value_parser = parse_square)]
     square_mm: Mm,
 }
 
@@ -110,8 +110,28 @@ fn parse_board(text: &str) -> Result<(usize, usize), String> {
 
 pub(super) fn parse_length(text: &str) -> Result<Mm, String> {
     let value: f64 = text.trim().parse().map_err(|_| "expected a number of mm".to_owned())?;
+    let within = |mm: &f64| mm.abs() <= LONGEST_MM;
+    if value.is_finite() && !within(&value) {
+        return Err(format!("expected {LONGEST_MM} mm or less"));
+    }
     Mm::new(value).map_err(|error| error.to_string())
 }
+
+/// The side of a square that can be printed and seen.
+fn parse_square(text: &str) -> Result<Mm, String> {
+    let side = parse_length(text)?;
+    let (smallest, largest) = SQUARES_MM;
+    if (smallest..=largest).contains(&side.get()) {
+        Ok(side)
+    } else {
+        Err(format!("expected {smallest} to {largest} mm"))
+    }
+}
+
+/// Lengths beyond this are mistyped \[mm\].
+const LONGEST_MM: f64 = 1e5;
+/// Sides of squares \[mm\].
+const SQUARES_MM: (f64, f64) = (0.01, 1e4);
 
 /// Runs the command; the table and the figures go to standard output. Fails
 /// without writing anything where no calibration can be found.
@@ -127,24 +147,26 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     let seen: Vec<Sighting> = looks.iter().filter_map(|(_, look)| look.clone().ok()).collect();
     let solution = solve::solve(&board, &seen).inspect_err(|_| say(&report::refusals(&looks)))?;
     say(&report::images(&looks, &solution));
-    let plane = plane::find(args, &board, &solution, &looks)?;
-    let findings = Findings::of(args, &board, &solution, &plane);
+    let plane = plane::find(args, &board, &solution, (&files, &looks))?;
+    let findings = Findings::of(args, &board, &solution, &plane)?;
     let calibration = write(args, &board, &solution, &plane, &findings)?;
-    let page = args.report.clone().unwrap_or_else(|| args.out.with_file_name("report.html"));
-    let text = Page {
+    let answer = text_of(args, &solution, &plane, &calibration, &findings);
+    say(&answer);
+    say(&format!("\nwrote {}\n", args.out.display()));
+    let page = Page {
         board: &board,
         looks: &looks,
         solution: &solution,
         maps: &findings.maps,
         limit_mm: args.max_width_sigma_mm.map(Mm::get),
         next: findings.next.as_ref(),
-        text: &text_of(args, &solution, &plane, &calibration, &findings),
+        text: &answer,
         calibration_file: &args.out.display().to_string(),
     }
     .page();
-    write_whole(&page, text.as_bytes())?;
-    say(&text_of(args, &solution, &plane, &calibration, &findings));
-    say(&format!("\nwrote {} and {}\n", args.out.display(), page.display()));
+    let report = args.report();
+    write_whole(&report, page.as_bytes())?;
+    say(&format!("wrote {}\n", report.display()));
     Ok(if findings.fails(args.max_width_sigma_mm) { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
@@ -156,14 +178,27 @@ struct Findings {
 }
 
 impl Findings {
-    fn of(args: &CalibrateArgs, board: &Board, solution: &Solution, plane: &Plane) -> Self {
+    /// Fails for a surface that the camera does not look down on.
+    fn of(
+        args: &CalibrateArgs,
+        board: &Board,
+        solution: &Solution,
+        plane: &Plane,
+    ) -> anyhow::Result<Self> {
         // Corners' noise is the least of the errors where the focal length is loose.
         let covariance = quality::settles_camera(solution)
             .then(|| Covariance::of(board, solution, &plane.on_bed, plane.thickness))
             .flatten();
         let Some(known) = &covariance else {
-            return Self { covariance, maps: Vec::new(), next: None };
+            return Ok(Self { covariance, maps: Vec::new(), next: None });
         };
+        let camera_mm = known.camera_height_mm();
+        if let Some(height) = args.surface_height_mm.iter().find(|h| h.get() >= camera_mm) {
+            anyhow::bail!(
+                "--surface-height-mm: found {height}, but the camera is only {camera_mm:.1} mm above \
+                 the bed"
+            );
+        }
         let above = Mm::new((known.camera_height_mm() / 20.0).round()).unwrap_or(Mm::ZERO);
         let usual = [Mm::ZERO, above];
         let told = args.surface_height_mm.as_slice();
@@ -173,7 +208,15 @@ impl Findings {
             heights.iter().map(|&height| WidthMap::of(known, bead, height)).collect()
         });
         let next = next_view::best(board, solution, known);
-        Self { covariance, maps, next }
+        Ok(Self { covariance, maps, next })
+    }
+
+    /// Share of a width that the calibration leaves open where boards were seen: of the
+    /// bead that was told or is usual, at the worst of the heights.
+    fn share(&self) -> Option<f64> {
+        let shares = self.maps.iter().map(|map| Some(map.worst_where_seen_mm? / map.bead_mm));
+        let told = shares.reduce(|a, b| Some(a?.max(b?))).flatten();
+        told.or_else(|| share::where_seen(self.covariance.as_ref()?))
     }
 
     /// Whether a width is known less well than it must be.
@@ -196,7 +239,7 @@ fn text_of(
         report::lens(solution),
         report::camera(solution),
         report::plane(plane),
-        report::width(calibration, covariance),
+        report::width(calibration, covariance, &findings.maps),
         report::maps(&findings.maps, args.max_width_sigma_mm),
         report::next_view(covariance, findings.next.as_ref()),
         report::scale(calibration, covariance, plane.thickness),
@@ -205,7 +248,29 @@ fn text_of(
     .concat()
 }
 
+impl CalibrateArgs {
+    fn report(&self) -> PathBuf {
+        self.report.clone().unwrap_or_else(|| self.out.with_file_name("report.html"))
+    }
+}
+
 fn check_lengths(args: &CalibrateArgs) -> Result<(), WrongArguments> {
+    let report = args.report();
+    if report == args.out {
+        let what = format!("--out and --report are both {}: name two files", report.display());
+        return Err(WrongArguments::new(what));
+    }
+    for (name, path) in [("out", &args.out), ("report", &report)] {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+            let what = format!("--{name} {}: no folder {}", path.display(), folder.display());
+            return Err(WrongArguments::new(what));
+        }
+        if path.is_dir() {
+            let what = format!("--{name} {}: a folder, expected a file", path.display());
+            return Err(WrongArguments::new(what));
+        }
+    }
     if args.board_thickness_mm < Mm::ZERO {
         return Err(WrongArguments::new("the board's thickness cannot be below 0 mm"));
     }
@@ -280,7 +345,7 @@ fn write(
     let covariance = findings.covariance.as_ref();
     let quality = Quality {
         reprojection_rms_px: solution.rms_px,
-        width_sigma_share: covariance.and_then(share::where_seen),
+        width_sigma_share: findings.share(),
         seen_px: covariance.map(|covariance| {
             let [from, to] = covariance.seen_px();
             [from.x, from.y, to.x, to.y].map(|px| (px * 10.0).round() / 10.0)

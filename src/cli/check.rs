@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use nalgebra::Point3;
 
+use super::WrongArguments;
 use super::cell::LoadedCell;
 use crate::calib::Calibration;
 use crate::config::Cell;
@@ -28,6 +29,7 @@ pub struct CheckArgs {
 /// Runs the command; the findings go to standard output.
 pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     let loaded = LoadedCell::read(&args.cell, Purpose::Measure)?;
+    check_height(&loaded)?;
     say!("{}: sound", args.cell.display());
     say!("  calibration  {}", loaded.calibration_words());
     if let Calibration::Full { image_size_px: [width, height], .. } = loaded.calibration {
@@ -58,30 +60,52 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// How far the camera is above the measured surface \[mm\]; `None` for a single scale.
+fn above_surface_mm(loaded: &LoadedCell) -> Option<f64> {
+    let Calibration::Full { bed, .. } = &loaded.calibration else { return None };
+    Some(bed.apply_inverse(Point3::origin()).z - loaded.cell.surface_height.get())
+}
+
+/// Refuses a surface that the camera does not look down on.
+fn check_height(loaded: &LoadedCell) -> Result<(), WrongArguments> {
+    let height = loaded.cell.surface_height;
+    match above_surface_mm(loaded) {
+        Some(above) if above <= 0.0 => Err(WrongArguments::new(format!(
+            "{}: calibration.surface_height_mm: found {height}, expected less than the camera's \
+             {:.1} mm above the bed",
+            loaded.path.display(),
+            above + height.get()
+        ))),
+        _ => Ok(()),
+    }
+}
+
 /// Tells where a cell uses a calibration beyond what it was made for.
 fn about_surface(loaded: &LoadedCell) {
-    let Calibration::Full { bed, quality, .. } = &loaded.calibration else { return };
     let (height, roi) = (loaded.cell.surface_height, loaded.cell.gauge.roi);
-    let above = bed.apply_inverse(Point3::origin()).z - height.get();
-    if above <= 0.0 {
-        say!("  WARNING      the surface lies {:.1} mm above the camera", -above);
+    let has_sigma = loaded.cell.surface_height_sigma > Mm::ZERO;
+    let Some(above) = above_surface_mm(loaded) else {
+        if has_sigma {
+            say!("  WARNING      surface_height_sigma_mm has no effect beside mm_per_px, which");
+            say!("               knows no height");
+        }
         return;
-    }
+    };
     say!(
         "  height       1 mm of error in surface_height_mm makes {:.3} % of error in a width",
         100.0 / above
     );
-    if loaded.cell.surface_height_sigma == Mm::ZERO {
+    if !has_sigma {
         say!("               (surface_height_sigma_mm puts it into sigma_mm)");
     }
-    let Some(quality) = quality else { return };
+    let Calibration::Full { quality: Some(quality), .. } = &loaded.calibration else { return };
     if let Some([low, high]) = quality.heights_mm
         && !(low..=high).contains(&height.get())
     {
         say!(
-            "  WARNING      surface_height_mm: {height} lies outside the {low} to {high} mm above \
-             the bed at which boards were seen"
+            "  WARNING      surface_height_mm: {height} lies outside the {low} to {high} mm above"
         );
+        say!("               the bed at which boards were seen");
     }
     let Some([left, top, right, bottom]) = quality.seen_px else { return };
     let ends = [roi.x, roi.y, roi.x + roi.width - 1, roi.y + roi.height - 1];
@@ -89,10 +113,12 @@ fn about_surface(loaded: &LoadedCell) {
         ends.map(|px| u32::try_from(px).map_or(f64::MAX, f64::from));
     if first_x < left || first_y < top || last_x > right || last_y > bottom {
         say!(
-            "  WARNING      gauge.roi_px reaches beyond where boards were seen, columns {left:.0} \
-             to {right:.0} and rows {top:.0} to {bottom:.0}; a width there is known less well than \
-             sigma_mm says"
+            "  WARNING      gauge.roi_px reaches beyond where boards were seen, columns {left:.0}"
         );
+        say!(
+            "               to {right:.0} and rows {top:.0} to {bottom:.0}; a width there is known"
+        );
+        say!("               less well than sigma_mm says");
     }
 }
 

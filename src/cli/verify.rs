@@ -22,6 +22,8 @@ const LENS_CHANGED: f64 = 2.0;
 /// A board that is further off its place than this is higher, and not the noise
 /// \[mm\].
 const HIGHER_MM: f64 = 0.3;
+/// A board that is tilted against the bed by more than this does not lie on it \[°\].
+const FLAT_DEG: f64 = 2.0;
 
 /// Measures a board that lies on the bed, and says whether the calibration still holds.
 #[derive(Debug, Args)]
@@ -56,6 +58,9 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
             format!("--max-error-percent: found {}, expected more than 0", args.max_error_percent);
         return Err(WrongArguments::new(what).into());
     }
+    if args.board_thickness_mm < Mm::ZERO {
+        return Err(WrongArguments::new("the board's thickness cannot be below 0 mm").into());
+    }
     if !args.image.is_file() {
         let what = format!("{}: no such picture", args.image.display());
         return Err(WrongArguments::new(what).into());
@@ -82,9 +87,8 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         _ => (None, None),
     };
     let borne = (args.max_error_percent / 100.0).hypot(STANDARD_DEVIATIONS * share.unwrap_or(0.0));
-    let holds = found.worst_error.abs() <= borne;
     tell(&found, args, borne, rms_px);
-    Ok(if holds { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if found.holds(borne) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn tell(found: &Findings, args: &VerifyArgs, borne: f64, rms_px: Option<f64>) {
@@ -92,9 +96,10 @@ fn tell(found: &Findings, args: &VerifyArgs, borne: f64, rms_px: Option<f64>) {
     say!("a square measures {:.4} mm ({:+.3} %)", found.square_mm, 100.0 * found.scale_error);
     say!(
         "largest error of a width {:+.3} % ({:+.3} mm in {length:.0} mm, about column {column:.1}, \
-         row {row:.1} of the board's corners)",
+         row {row:.1} of the board's corners), of which the corners' noise may make {:.3} %",
         100.0 * found.worst_error,
-        found.worst_error * length
+        found.worst_error * length,
+        100.0 * found.noise
     );
     say!("corners lie {:.3} mm off a true board (RMS)", found.rms_mm);
     say!(
@@ -104,18 +109,21 @@ fn tell(found: &Findings, args: &VerifyArgs, borne: f64, rms_px: Option<f64>) {
     );
     let before = rms_px.map_or_else(String::new, |px| format!(" ({px:.3} px when calibrated)"));
     say!("reprojection error of the lens alone {:.3} px{before}", found.reprojection_rms_px);
-    if found.worst_error.abs() <= borne {
+    if found.holds(borne) {
         say!("HOLDS: no width is more than {:.3} % wrong", 100.0 * borne);
         return;
     }
     say!("DOES NOT HOLD: a width is more than {:.3} % wrong", 100.0 * borne);
     if rms_px.is_some_and(|px| found.reprojection_rms_px > LENS_CHANGED * px) {
         say!("  the lens is not as it was: focus, zoom or the board's flatness; calibrate anew");
+    } else if found.tilt_deg > FLAT_DEG {
+        say!("  the board does not lie flat on the bed: it is tilted by {:.1}°", found.tilt_deg);
     } else if found.height_mm.abs() > HIGHER_MM {
         say!(
-            "  as if the board lay {:.2} mm {} than {} above the bed: see that the robot stands at \
-             the z of the bed plane's picture, and that --board-thickness-mm is right; otherwise \
-             the camera has moved, so take the bed plane anew (calibrate --plane)",
+            "  as if the board lay {:.2} mm {} than {} above the bed: see that --square-mm and \
+             --board-thickness-mm are right, and that the robot stands at the z of the bed \
+             plane's picture; otherwise the camera has moved, so take the bed plane anew \
+             (calibrate --plane)",
             found.height_mm.abs(),
             if found.height_mm > 0.0 { "higher" } else { "lower" },
             args.board_thickness_mm

@@ -42,9 +42,9 @@ impl Paper {
 /// A board that does not fit on its paper.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "the board with its margin and its bar needs {need_mm:.0} x {need_high_mm:.0} mm, the paper \
+    "the board with its margin and its bar needs {:.0} x {:.0} mm, the paper \
      has {width_mm} x {height_mm} mm: take smaller squares, fewer of them, or larger paper",
-    width_mm = paper.width_mm, height_mm = paper.height_mm
+    need_mm.ceil(), need_high_mm.ceil(), width_mm = paper.width_mm, height_mm = paper.height_mm
 )]
 pub struct TooLarge {
     /// Width that is needed \[mm\].
@@ -74,7 +74,7 @@ impl Sheet {
         let (columns, rows) = board.corners();
         let side = board.square().get();
         let (width, height) = ((columns + 1) as f64 * side, (rows + 1) as f64 * side);
-        let need_mm = width + 2.0 * MARGIN_MM;
+        let need_mm = width.max(BAR_MM[1]) + 2.0 * MARGIN_MM;
         let need_high_mm = height + 2.0 * MARGIN_MM + FOOT_MM;
         if need_mm > paper.width_mm || need_high_mm > paper.height_mm {
             return Err(TooLarge { need_mm, need_high_mm, paper });
@@ -87,7 +87,8 @@ impl Sheet {
             .map(|(column, row)| [left + column as f64 * side, top + row as f64 * side, side, side])
             .collect();
         let middle = paper.width_mm / 2.0;
-        let bar = if need_mm >= BAR_MM[0] + 2.0 * MARGIN_MM { BAR_MM[0] } else { BAR_MM[1] };
+        let has_room = paper.width_mm >= BAR_MM[0] + 2.0 * MARGIN_MM;
+        let bar = if has_room { BAR_MM[0] } else { BAR_MM[1] };
         let base = top + height + 14.0;
         black.extend(ruler(middle - bar / 2.0, base, bar));
         let words = vec![

@@ -12,12 +12,22 @@ use crate::calib::sighting::{Looks, Refusal};
 use crate::calib::solve::Solution;
 use crate::units::Mm;
 
+/// Corners on the bed may be so many times further off than those of the other
+/// pictures, and so far in any case \[px\]; beyond that the pictures do not belong to
+/// this camera, or the boards lay on no plane.
+const OFF: f64 = 4.0;
+const OFF_PX: f64 = 0.3;
+/// Mean shift of the corners below which two boards are in one place \[px\].
+const SAME_PLACE_PX: f64 = 1.0;
+
 /// The bed plane and where it comes from.
 pub struct Plane {
     /// The images whose boards lay on the bed.
     pub images: Vec<String>,
     /// Whether nobody has named them.
     pub assumed: bool,
+    /// Images that come later, and were refused though they show a board.
+    pub passed_over: Vec<String>,
     /// The boards on the bed.
     pub on_bed: OnBed,
     /// Height of their printed faces above the bed.
@@ -40,12 +50,12 @@ pub fn check(planes: &[PathBuf], files: &[PathBuf]) -> Result<(), WrongArguments
     }
 }
 
-/// The image of the folder that is meant: by path, or by its name alone.
+/// The image of the folder that is meant: by path, or by its name alone where there is
+/// no such file.
 fn index_of(plane: &Path, files: &[PathBuf]) -> Option<usize> {
+    let by_name = !plane.is_file() && plane.parent().is_none_or(|p| p.as_os_str().is_empty());
     let is_same = |file: &PathBuf| {
-        let by_name = plane.parent().is_none_or(|p| p.as_os_str().is_empty());
-        file == plane
-            || (by_name && file.file_name() == plane.file_name())
+        (by_name && file.file_name() == plane.file_name())
             || plane.canonicalize().is_ok_and(|p| file.canonicalize().is_ok_and(|f| f == p))
     };
     files.iter().position(is_same)
@@ -57,61 +67,125 @@ pub fn find(
     args: &CalibrateArgs,
     board: &Board,
     solution: &Solution,
-    looks: &Looks,
+    (files, looks): (&[PathBuf], &Looks),
 ) -> anyhow::Result<Plane> {
-    let mut images = Vec::new();
-    let mut boards = Vec::new();
+    let mut found: Vec<(String, Vec<Corner>)> = Vec::new();
+    let mut passed_over = Vec::new();
     if args.plane.is_empty() {
-        let last = solution.views.last().context("no picture shows the board")?;
-        images.push(last.name.clone());
-        boards.push(board.place(&last.corners));
+        let (last, later) = last_seen(solution, looks).context("no picture shows the board")?;
+        found.push((last.to_owned(), corners_of(board, solution, last).unwrap_or_default()));
+        passed_over = later;
     }
     for path in &args.plane {
-        let (image, corners) = on_bed(path, &args.input, board, solution, looks)?;
-        images.push(image);
-        boards.push(corners);
+        let (image, corners) = on_bed(path, board, solution, (files, looks))?;
+        if let Some((twin, _)) = found.iter().find(|(_, other)| is_same_place(other, &corners)) {
+            bail!(
+                "--plane {image}: the board is where it is in {twin}, which says nothing new; leave \
+                 one of them out, or move the board on the bed"
+            );
+        }
+        found.push((image, corners));
     }
+    let (images, boards): (Vec<String>, Vec<Vec<Corner>>) = found.into_iter().unzip();
     let on_bed = OnBed::fit(&solution.model, boards)
         .with_context(|| format!("the corners in {} fit no plane", images.join(", ")))?;
+    let most_px = (OFF * solution.rms_px).max(OFF_PX);
+    if on_bed.rms_px > most_px {
+        let names = images.join(", ");
+        if images.len() > 1 {
+            bail!(
+                "the boards in {names} do not lie on one plane: corners are {:.2} px off (RMS), the \
+                 board that is furthest off by {:.1} mm; name pictures of boards that all lie flat on \
+                 the bed",
+                on_bed.rms_px,
+                on_bed.off_mm
+            );
+        }
+        bail!(
+            "{names}: corners are {:.2} px off (RMS) where the other pictures have {:.2} px; was it \
+             taken with the same camera, focus and zoom?",
+            on_bed.rms_px,
+            solution.rms_px
+        );
+    }
     Ok(Plane {
         images,
         assumed: args.plane.is_empty(),
+        passed_over,
         on_bed,
         thickness: args.board_thickness_mm,
         robot_z: args.robot_z_mm,
     })
 }
 
+/// The last picture that shows a board, or its twin where the board was in its place
+/// before; and those after it that show a board, but were refused.
+fn last_seen<'a>(solution: &'a Solution, looks: &'a Looks) -> Option<(&'a str, Vec<String>)> {
+    let mut later = Vec::new();
+    for (name, look) in looks.iter().rev() {
+        match look {
+            Ok(_) if solution.views.iter().any(|view| view.name == *name) => {
+                return Some((name, later));
+            }
+            Err(Refusal::Duplicate { of, .. }) => return Some((of, later)),
+            Ok(_) | Err(Refusal::Unreadable(_) | Refusal::NoBoard { .. }) => {}
+            Err(_) => later.push(name.clone()),
+        }
+    }
+    None
+}
+
+fn corners_of(board: &Board, solution: &Solution, name: &str) -> Option<Vec<Corner>> {
+    let view = solution.views.iter().find(|view| view.name == name)?;
+    Some(board.place(&view.corners))
+}
+
 /// The board's corners in the named picture: out of the folder's where it took part,
 /// else looked for anew.
 fn on_bed(
     path: &Path,
-    folder: &Path,
     board: &Board,
     solution: &Solution,
-    looks: &Looks,
+    (files, looks): (&[PathBuf], &Looks),
 ) -> anyhow::Result<(String, Vec<Corner>)> {
-    let names: Vec<PathBuf> = looks.iter().map(|(name, _)| PathBuf::from(name)).collect();
-    let own = path.file_name().filter(|_| !path.is_file() || index_of(path, &names).is_some());
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    if let Some(view) = solution.views.iter().find(|view| view.name == name) {
-        return Ok((name, board.place(&view.corners)));
-    }
-    let in_folder = folder.join(&name);
-    let file = if path.is_file() { path } else { &in_folder };
-    if own.is_some()
-        && let Some((_, Err(refusal))) = looks.iter().find(|look| look.0 == name)
-        // A board that is in one place twice still lies on the bed.
-        && !matches!(refusal, Refusal::Duplicate { .. })
+    if let Some((file, (name, look))) =
+        index_of(path, files).and_then(|index| Some((files.get(index)?, looks.get(index)?)))
     {
-        bail!("--plane {name}: {refusal}; name an image that shows the whole board");
+        return match look {
+            Ok(_) => corners_of(board, solution, name)
+                .map(|corners| (name.clone(), corners))
+                .with_context(|| format!("--plane {name}: not used")),
+            // A board that is in one place twice still lies on the bed.
+            Err(Refusal::Duplicate { .. }) => looked_for(file, board, solution),
+            Err(refusal) => {
+                bail!("--plane {name}: {refusal}; name an image that shows the whole board")
+            }
+        };
     }
-    let sighting = look_at(board, &name, file)
-        .with_context(|| format!("--plane {} does not show the bed plane", path.display()))?;
+    looked_for(path, board, solution)
+}
+
+fn looked_for(
+    path: &Path,
+    board: &Board,
+    solution: &Solution,
+) -> anyhow::Result<(String, Vec<Corner>)> {
+    let name = path.display().to_string();
+    let sighting = look_at(board, &name, path)
+        .with_context(|| format!("--plane {name} does not show the bed plane"))?;
     if sighting.image_size_px != solution.image_size_px {
         let refusal =
             Refusal::Size { found: sighting.image_size_px, expected: solution.image_size_px };
-        bail!("--plane {}: {refusal}", path.display());
+        bail!("--plane {name}: {refusal}");
     }
-    Ok((path.display().to_string(), board.place(&sighting.corners)))
+    Ok((name, board.place(&sighting.corners)))
+}
+
+/// Whether two pictures show the board in one place.
+fn is_same_place(a: &[Corner], b: &[Corner]) -> bool {
+    #[expect(clippy::cast_precision_loss, reason = "a count of corners")]
+    let count = a.len().max(1) as f64;
+    let straight: f64 = a.iter().zip(b).map(|(a, b)| (a.seen - b.seen).norm()).sum();
+    let turned: f64 = a.iter().zip(b.iter().rev()).map(|(a, b)| (a.seen - b.seen).norm()).sum();
+    a.len() == b.len() && straight.min(turned) / count < SAME_PLACE_PX
 }

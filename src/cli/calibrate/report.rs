@@ -12,10 +12,8 @@ use crate::calib::map::WidthMap;
 use crate::calib::next_view::NextView;
 use crate::calib::quality;
 use crate::calib::scale::single_scale;
-use crate::calib::share;
 use crate::calib::sighting::Looks;
 use crate::calib::solve::{SHARED_NAMES, Solution};
-use crate::geometry::ImagePoint;
 use crate::units::Mm;
 
 /// Adds a line to a text, which cannot fail.
@@ -87,6 +85,9 @@ pub fn lens(solution: &Solution) -> String {
     out
 }
 
+/// Letters of the longest name of a number.
+const NAME: usize = 18;
+
 /// Intrinsics and distortion with their standard deviations.
 pub fn camera(solution: &Solution) -> String {
     let mut out = String::new();
@@ -104,7 +105,7 @@ pub fn camera(solution: &Solution) -> String {
             _ => (6, ""),
         };
         let sigma = sigma.map_or_else(|| "?".to_owned(), |sigma| format!("{sigma:.digits$}"));
-        line!(out, "  {name:4}  {value:10.digits$} ± {sigma}{unit}");
+        line!(out, "  {name:NAME$}  {value:10.digits$} ± {sigma}{unit}");
     }
     line!(out, "  noise of a corner: {:.3} px", solution.noise_px);
     out
@@ -124,13 +125,21 @@ pub fn plane(plane: &Plane) -> String {
     let tilt_deg = (-up.z).clamp(-1.0, 1.0).acos().to_degrees();
     line!(out, "\nbed plane");
     line!(out, "  image       {} ({how})", plane.images.join(", "));
+    line!(out, "  corners     {:.3} px off (RMS)", plane.on_bed.rms_px);
+    if !plane.passed_over.is_empty() {
+        line!(
+            out,
+            "  WARNING     {} after it cannot be used: if the board lay on the bed there, take",
+            plane.passed_over.join(", ")
+        );
+        line!(out, "              that picture again, or name another with --plane");
+    }
     if plane.images.len() > 1 {
         line!(
             out,
-            "  boards      {} on one plane, to {:.2} mm; corners {:.3} px off (RMS)",
+            "  boards      {} on one plane, to {:.2} mm",
             plane.images.len(),
-            plane.on_bed.off_mm,
-            plane.on_bed.rms_px
+            plane.on_bed.off_mm
         );
     }
     line!(
@@ -146,12 +155,18 @@ pub fn plane(plane: &Plane) -> String {
     out
 }
 
-/// How far a width can be trusted, with a bead in the middle of the picture as
-/// an example.
-pub fn width(calibration: &Calibration, covariance: Option<&Covariance>) -> String {
+/// How far a width can be trusted.
+pub fn width(
+    calibration: &Calibration,
+    covariance: Option<&Covariance>,
+    maps: &[WidthMap],
+) -> String {
     let mut out = String::new();
-    let shares = covariance.map(|c| (c, share::where_seen(c), share::anywhere(c)));
-    let Some((covariance, Some(share), anywhere)) = shares else {
+    let quality = match calibration {
+        Calibration::Full { quality: Some(quality), .. } => quality.width_sigma_share,
+        _ => None,
+    };
+    let (Some(covariance), Some(share)) = (covariance, quality) else {
         line!(
             out,
             "\nhow well a width on the bed is known cannot be told, and is not in the file: the"
@@ -160,30 +175,33 @@ pub fn width(calibration: &Calibration, covariance: Option<&Covariance>) -> Stri
         line!(out, "  degrees to several sides");
         return out;
     };
-    let example = example(calibration, share);
-    line!(out, "\na width on the bed is known to {:.3} %{example}", 100.0 * share);
+    let bead = maps.first().map_or_else(String::new, |map| {
+        format!(" ({:.4} mm in {} mm)", share * map.bead_mm, map.bead_mm)
+    });
+    line!(out, "\na width is known to {:.3} %{bead} where boards were seen,", 100.0 * share);
     line!(out, "  as far as the corners' noise tells; sigma_mm of each width contains it");
     let [from, to] = covariance.seen_px();
     line!(
         out,
-        "  holds where boards were seen, columns {:.0} to {:.0} and rows {:.0} to {:.0};",
+        "  boards were seen in columns {:.0} to {:.0} and rows {:.0} to {:.0}; beads of another",
         from.x,
         to.x,
         from.y,
         to.y
     );
-    if let Some(anywhere) = anywhere {
-        line!(out, "  in all of the picture it is {:.3} % or better", 100.0 * anywhere);
-    } else {
-        line!(out, "  elsewhere it cannot be told: not all of the picture sees the bed");
-    }
+    line!(out, "  width have another share: give yours as --bead-mm");
     out
 }
 
 /// What is left open in the width of one bead, in millimetres, at each height.
 pub fn maps(maps: &[WidthMap], limit: Option<Mm>) -> String {
     let mut out = String::new();
-    let Some(first) = maps.first() else { return out };
+    let Some(first) = maps.first() else {
+        if limit.is_some() {
+            line!(out, "\nFAIL: how well a width is known cannot be told");
+        }
+        return out;
+    };
     line!(out, "\nstandard deviation of the width of a bead of {} mm", first.bead_mm);
     line!(out, "  {:>10}  {:>16}  {:>22}  if its height", "its height", "where boards", "all over");
     line!(out, "  {:>10}  {:>16}  {:>22}  is 1 mm wrong", "above bed", "were seen", "the picture");
@@ -227,20 +245,6 @@ pub fn next_view(covariance: Option<&Covariance>, next: Option<&NextView>) -> St
         (Some(_), None) => line!(out, "\none more picture would bring less than 3 %"),
     }
     out
-}
-
-/// The share of a bead that is a third of the picture's width wide, in mm.
-fn example(calibration: &Calibration, share: f64) -> String {
-    let ends = calibration.image_size_px().and_then(|size| {
-        let [width, height] = size.map(f64::from);
-        let end = |part: f64| ImagePoint::new(part * width, height / 2.0);
-        let map = calibration.surface(Mm::ZERO, None);
-        Some((map.to_mm(end(1.0 / 3.0))?, map.to_mm(end(2.0 / 3.0))?))
-    });
-    ends.map_or_else(String::new, |(left, right)| {
-        let width_mm = (right - left).norm();
-        format!(" ({:.3} mm in {width_mm:.0} mm)", share * width_mm)
-    })
 }
 
 /// The single number of the 2022 paper, and what it is worth.
