@@ -83,7 +83,7 @@ fn same_widths(run: &Path, again: &Path) {
     for (time_s, status, width_mm) in &again {
         let after_s = time_s - again[0].0;
         let twin = run.iter().find(|row| (row.0 - run[0].0 - after_s).abs() < 1e-6);
-        let (_, run_status, run_width) = twin.expect("a recorded frame has a row in the run");
+        let (_, run_status, run_width) = twin.unwrap();
         assert_eq!((status, width_mm), (run_status, run_width), "{after_s} s after the first");
     }
 }
