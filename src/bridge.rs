@@ -3,10 +3,12 @@
 
 mod board;
 mod lines;
+mod quads;
 mod video;
 
 pub use board::{find_any_board, find_board};
 pub use lines::{EdgeSettings, LineFinder, Segment, canny_hough};
+pub use quads::find_quads;
 pub use video::{VideoInput, VideoReader};
 
 use std::sync::Once;

@@ -58,7 +58,7 @@ mod parallel;
 mod path;
 mod phase;
 mod pool;
-mod rank;
+pub(crate) mod rank;
 mod refine;
 pub mod reject;
 mod saturated;

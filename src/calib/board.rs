@@ -1,8 +1,9 @@
-//! The checkerboard: where its inner corners are, and whether what was found
-//! in a picture can be them.
+//! The checkerboard, plain or with markers in its white squares: where its inner
+//! corners are, and whether what was found in a picture can be them.
 
 use nalgebra::{Point2, Point3};
 
+use super::dictionary::Dictionary;
 use super::equations::Corner;
 use crate::geometry::ImagePoint;
 use crate::units::Mm;
@@ -13,6 +14,17 @@ pub struct Board {
     columns: usize,
     rows: usize,
     square: Mm,
+    marks: Option<Marks>,
+}
+
+/// What makes a checkerboard one of `ChArUco`: a marker in every white square, which
+/// tells which square it is. They are numbered row by row from the upper left.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Marks {
+    /// Side of a marker, with its black border.
+    pub side: Mm,
+    /// Where the markers are from.
+    pub dictionary: Dictionary,
 }
 
 /// A corner of the board in a picture.
@@ -46,7 +58,30 @@ pub enum BoardError {
     /// No size.
     #[error("the side of a square must be more than 0 mm, found {0}")]
     Square(Mm),
+    /// A marker that does not fit into a square, or is too small to be read.
+    #[error(
+        "the side of a marker must be {:.0} to {:.0} % of that of a square, found {side} in \
+         squares of {square}", 100.0 * MARKER.start(), 100.0 * MARKER.end()
+    )]
+    Marker {
+        /// Side of a marker.
+        side: Mm,
+        /// Side of a square.
+        square: Mm,
+    },
+    /// More white squares than a dictionary has markers.
+    #[error(
+        "the board has {needed} white squares, and there are {} markers: take fewer squares",
+        Dictionary::MARKERS
+    )]
+    Markers {
+        /// White squares.
+        needed: usize,
+    },
 }
+
+/// Sides of markers over those of squares.
+const MARKER: std::ops::RangeInclusive<f64> = 0.4..=0.9;
 
 /// Corners that are not those of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -83,7 +118,58 @@ impl Board {
         if square <= Mm::ZERO {
             return Err(BoardError::Square(square));
         }
-        Ok(Self { columns, rows, square })
+        Ok(Self { columns, rows, square, marks: None })
+    }
+
+    /// The same with a marker in each white square. Fails where they do not fit, or
+    /// there are not as many.
+    pub fn with_marks(self, marks: Marks) -> Result<Self, BoardError> {
+        if !MARKER.contains(&(marks.side.get() / self.square.get())) {
+            return Err(BoardError::Marker { side: marks.side, square: self.square });
+        }
+        let needed = (self.columns + 1) * (self.rows + 1) / 2;
+        if needed > Dictionary::MARKERS {
+            return Err(BoardError::Markers { needed });
+        }
+        Ok(Self { marks: Some(marks), ..self })
+    }
+
+    /// Its markers; `None` for a plain checkerboard.
+    pub fn marks(&self) -> Option<Marks> {
+        self.marks
+    }
+
+    /// Whether it looks the same after half a turn, or counted from its other end.
+    pub fn is_plain(&self) -> bool {
+        self.marks.is_none()
+    }
+
+    /// The black cells of the marker in a square, counted from the upper left one, with
+    /// its border: column and row of each cell among the marker's, `side + 2` along each
+    /// side. Empty where there is none.
+    pub fn black_cells(&self, column: usize, row: usize) -> Vec<(usize, usize)> {
+        let Some(marks) = self.marks.filter(|_| (column + row) % 2 == 1) else {
+            return Vec::new();
+        };
+        let squares = self.columns + 1;
+        // White squares before it: half of the rows above, and of its own.
+        let before = row * squares + column;
+        let number = before / 2;
+        let all = marks.dictionary.side() + 2;
+        let inner = 1..all - 1;
+        let is_white = |column: usize, row: usize| {
+            inner.contains(&column)
+                && inner.contains(&row)
+                && marks.dictionary.is_white(number, column - 1, row - 1)
+        };
+        let cells = (0..all * all).map(|i| (i % all, i / all));
+        cells.filter(|&(column, row)| !is_white(column, row)).collect()
+    }
+
+    /// Width of the plain border between a marker and its square's sides, over the side
+    /// of a square; half a square without markers.
+    pub fn clear(&self) -> f64 {
+        self.marks.map_or(0.5, |marks| 0.5 * (1.0 - marks.side.get() / self.square.get()))
     }
 
     /// Inner corners along a row and along a column.
@@ -221,6 +307,17 @@ mod tests {
         let line = seen(&board).iter().map(|p| Point2::new(p.x, 50.0 + p.x)).collect();
         assert_eq!(board.order(line), Err(NotABoard::Folded { column: 0, row: 0 }));
         assert_eq!(board.order(vec![]), Err(NotABoard::Count { found: 0, expected: 12 }));
+    }
+
+    #[test]
+    fn markers_must_fit_into_their_squares_and_be_as_many() {
+        let marks = |side| Marks { side: Mm::constant(side), dictionary: Dictionary::Four };
+        let with = board().with_marks(marks(14.0)).unwrap();
+        assert!((with.clear() - 0.15).abs() < 1e-12 && !with.is_plain());
+        let too_large = board().with_marks(marks(20.0)).unwrap_err().to_string();
+        assert!(too_large.contains("40 to 90 % of that of a square, found 20 mm"), "{too_large}");
+        let many = Board::new(60, 40, Mm::constant(20.0)).unwrap().with_marks(marks(14.0));
+        assert_eq!(many, Err(BoardError::Markers { needed: 1250 }));
     }
 
     #[test]

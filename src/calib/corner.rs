@@ -6,7 +6,6 @@ use nalgebra::{SMatrix, SVector, Vector2};
 
 use super::board::Board;
 use super::grey::Grey;
-use crate::frame::Frame;
 use crate::geometry::ImagePoint;
 use crate::vision::step::StepTable;
 
@@ -29,39 +28,79 @@ const FOUND_PX: f64 = 3e-4;
 const FARTHEST: f64 = 0.7;
 const BLUR_PX: std::ops::RangeInclusive<f64> = 0.2..=8.0;
 const FIRST_BLUR_PX: f64 = 1.0;
+/// How far a marker's blur reaches \[px\], and the part of the plain border beside it that
+/// is used in any case.
+const MARKER_BLUR_PX: f64 = 2.5;
+const LEAST_CLEAR: f64 = 0.5;
+/// Half the contrast of a corner that is there \[grey levels\], and what it may leave of
+/// the pixels over it (RMS).
+const LEAST_HALF: f64 = 10.0;
+const MOST_LEFT: f64 = 0.3;
 
-/// Refines the corners of a board, given row by row. One whose surroundings do not fit
-/// stays where it is.
-pub fn refine(board: &Board, frame: &Frame, rough: &[ImagePoint]) -> Vec<ImagePoint> {
-    let (columns, rows) = board.corners();
-    if rough.len() != columns * rows {
-        return rough.to_vec();
-    }
-    let (grey, table) = (Grey::of(frame), StepTable::default());
-    // How much the lens bends the lines is seen from where their corners are, and that
-    // only once these are known well.
-    let straight = pass(&grey, &table, board, rough, false);
-    pass(&grey, &table, board, &straight, true)
+/// The white squares that have a marker, by the corner that they meet at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Marked {
+    /// The one before it along both rows and columns, and the one after it.
+    Along,
+    /// The two others.
+    Across,
 }
 
-fn pass(
-    grey: &Grey<'_>,
-    table: &StepTable,
+/// Refines the corners of a board, given row by row as far as they were seen. `None` is
+/// one whose surroundings do not fit, or leave the picture. Where white squares have
+/// markers, `first_has_marker` tells which are white, and their markers are left out.
+pub fn refine(
     board: &Board,
-    from: &[ImagePoint],
-    is_bent: bool,
-) -> Vec<ImagePoint> {
+    grey: &Grey<'_>,
+    rough: &[Option<ImagePoint>],
+    first_has_marker: bool,
+) -> Vec<Option<ImagePoint>> {
     let (columns, rows) = board.corners();
-    let refined = |index: usize| {
-        let (column, row) = (index % columns, index / columns);
-        let lines = [
-            Line::along(column, columns, |i| from[row * columns + i]),
-            Line::along(row, rows, |i| from[i * columns + column]),
-        ];
-        let lines = if is_bent { lines } else { lines.map(|line| Line { bend: 0.0, ..line }) };
-        refined(grey, table, from[index], lines).unwrap_or(from[index])
-    };
-    (0..from.len()).map(refined).collect()
+    if rough.len() != columns * rows {
+        return vec![None; rough.len()];
+    }
+    let pass = Pass { board, grey, table: &StepTable::default(), first_has_marker };
+    // How much the lens bends the lines is seen from where their corners are, and that
+    // only once these are known well.
+    let straight = pass.run(rough, rough, false);
+    pass.run(&straight, rough, true)
+}
+
+/// Once over all corners.
+struct Pass<'a> {
+    board: &'a Board,
+    grey: &'a Grey<'a>,
+    table: &'a StepTable,
+    first_has_marker: bool,
+}
+
+impl Pass<'_> {
+    /// From places that are known, or else roughly known.
+    fn run(
+        &self,
+        known: &[Option<ImagePoint>],
+        rough: &[Option<ImagePoint>],
+        is_bent: bool,
+    ) -> Vec<Option<ImagePoint>> {
+        let (columns, rows) = self.board.corners();
+        let place = |index: usize| known[index].or(rough[index]);
+        let refined = |index: usize| {
+            let (column, row) = (index % columns, index / columns);
+            let lines = [
+                Line::along(column, columns, |i| place(row * columns + i))?,
+                Line::along(row, rows, |i| place(i * columns + column))?,
+            ];
+            let lines = if is_bent { lines } else { lines.map(|line| Line { bend: 0.0, ..line }) };
+            let marked = self.board.marks().map(|_| {
+                let even = (column + row) % 2 == 0;
+                if even == self.first_has_marker { Marked::Along } else { Marked::Across }
+            });
+            let window =
+                Window { sides: lines.map(|line| line.side), clear: self.board.clear(), marked };
+            refined(self.grey, self.table, place(index)?, lines, &window)
+        };
+        (0..known.len()).map(refined).collect()
+    }
 }
 
 /// A line of the board at one of its corners.
@@ -75,16 +114,63 @@ struct Line {
 }
 
 impl Line {
-    /// Through the corners on either side, as far as there are.
-    fn along(at: usize, count: usize, corner: impl Fn(usize) -> ImagePoint) -> Self {
+    /// Through the corners on either side, as far as there are; straight where there
+    /// are not three in a row. `None` without another corner.
+    fn along(
+        at: usize,
+        count: usize,
+        corner: impl Fn(usize) -> Option<ImagePoint>,
+    ) -> Option<Self> {
         let middle = at.clamp(1, count - 2);
-        let (before, after) = (corner(middle - 1), corner(middle + 1));
+        let next = || Some(corner(at + 1).filter(|_| at + 1 < count)? - corner(at)?);
+        let last = || Some(corner(at)? - corner(at.checked_sub(1)?)?);
+        let three = corner(middle - 1).zip(corner(middle)).zip(corner(middle + 1));
+        let Some(((before, between), after)) = three else {
+            let beyond = |at: usize| at < count;
+            let side = if beyond(at + 1) { next().or_else(last) } else { last() };
+            return Some(Self { side: side?, bend: 0.0 });
+        };
         let across = (after - before) / 2.0;
-        let second = before.coords + after.coords - corner(middle).coords * 2.0;
+        let second = before.coords + after.coords - between.coords * 2.0;
         let length = across.norm();
         let bend = across.perp(&second) / length.powi(3);
-        let side = if at == middle { across } else { corner(at.max(1)) - corner(at.max(1) - 1) };
-        Self { side, bend }
+        let side = if at == middle { across } else { last().or_else(next)? };
+        Some(Self { side, bend })
+    }
+}
+
+/// The part of a corner's surroundings that shows two lines and nothing else.
+struct Window {
+    /// To the next corners along a row and along a column \[px\].
+    sides: [Vector2<f64>; 2],
+    /// Plain border about a marker, over the side of a square.
+    clear: f64,
+    marked: Option<Marked>,
+}
+
+impl Window {
+    /// Radius \[px\].
+    fn radius(&self) -> f64 {
+        // The nearest line that does not run through the corner is a side's end, or the
+        // one that runs through it beside the other side.
+        let area = self.sides[0].perp(&self.sides[1]).abs();
+        let distance = (area / self.sides[0].norm()).min(area / self.sides[1].norm());
+        (distance * WINDOW_OVER_DISTANCE).clamp(SMALLEST_WINDOW_PX, LARGEST_WINDOW_PX)
+    }
+
+    /// Whether a place, as seen from the corner, is no part of a marker, nor blurred by
+    /// one.
+    fn is_clear(&self, at: Vector2<f64>) -> bool {
+        let Some(marked) = self.marked else { return true };
+        let [row, column] = self.sides;
+        let area = row.perp(&column);
+        // In squares along the row and along the column.
+        let (along, across) = (at.perp(&column) / area, row.perp(&at) / area);
+        let is_marked = (along * across > 0.0) == (marked == Marked::Along);
+        let reach = |side: &Vector2<f64>| {
+            (self.clear - MARKER_BLUR_PX / side.norm()).max(LEAST_CLEAR * self.clear)
+        };
+        !is_marked || along.abs() < reach(&row) || across.abs() < reach(&column)
     }
 }
 
@@ -197,19 +283,14 @@ impl Corner {
     }
 }
 
-/// A corner from which the board's sides run to its neighbours.
+/// A corner whose lines run like these.
 fn refined(
     grey: &Grey<'_>,
     table: &StepTable,
     rough: ImagePoint,
     lines: [Line; 2],
+    window: &Window,
 ) -> Option<ImagePoint> {
-    let sides = lines.map(|line| line.side);
-    // The nearest line that does not run through the corner is a side's end, or the
-    // one that runs through it beside the other side.
-    let area = sides[0].perp(&sides[1]).abs();
-    let distance = (area / sides[0].norm()).min(area / sides[1].norm());
-    let window = (distance * WINDOW_OVER_DISTANCE).clamp(SMALLEST_WINDOW_PX, LARGEST_WINDOW_PX);
     let samples = samples(grey, rough, window)?;
     let mut corner = start(&samples, lines)?;
     let mut sums = corner.sums(table, &samples);
@@ -237,30 +318,44 @@ fn refined(
         }
     }
     let is_sound =
-        corner.at.norm() < FARTHEST * window && corner.at.iter().all(|at| at.is_finite());
-    is_sound.then(|| rough + corner.at)
+        corner.at.norm() < FARTHEST * window.radius() && corner.at.iter().all(|at| at.is_finite());
+    (is_sound && shows(window, &corner, &sums, samples.len())).then(|| rough + corner.at)
 }
 
-/// The pixels within a circle about a corner; `None` where it leaves the picture.
+/// Whether a corner that was not seen, but foretold by markers, is there: bright and
+/// dark are where they should be, and nothing lies over it.
+#[expect(clippy::cast_precision_loss, reason = "a count of pixels")]
+fn shows(window: &Window, corner: &Corner, sums: &Sums, count: usize) -> bool {
+    let Some(marked) = window.marked else { return true };
+    let half = corner.levels[1];
+    // White squares have the markers; the contrast is that of the squares across over
+    // those along.
+    let white = if marked == Marked::Across { half } else { -half };
+    white > LEAST_HALF && (sums.squares / count as f64).sqrt() < MOST_LEFT * white
+}
+
+/// The pixels within a circle about a corner, without those that a marker disturbs;
+/// `None` where it leaves the picture.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     clippy::cast_precision_loss,
     reason = "checked to lie in the picture"
 )]
-fn samples(grey: &Grey<'_>, rough: ImagePoint, window: f64) -> Option<Vec<Sample>> {
+fn samples(grey: &Grey<'_>, rough: ImagePoint, window: &Window) -> Option<Vec<Sample>> {
     let (width, height) = grey.size();
-    let inside = |at: f64, side: usize| at - window >= 0.0 && at + window <= side as f64 - 1.0;
+    let radius = window.radius();
+    let inside = |at: f64, side: usize| at - radius >= 0.0 && at + radius <= side as f64 - 1.0;
     if !inside(rough.x, width) || !inside(rough.y, height) {
         return None;
     }
-    let (from_x, to_x) = ((rough.x - window).ceil() as usize, (rough.x + window) as usize);
-    let (from_y, to_y) = ((rough.y - window).ceil() as usize, (rough.y + window) as usize);
+    let (from_x, to_x) = ((rough.x - radius).ceil() as usize, (rough.x + radius) as usize);
+    let (from_y, to_y) = ((rough.y - radius).ceil() as usize, (rough.y + radius) as usize);
     let mut samples = Vec::with_capacity((to_x - from_x + 1) * (to_y - from_y + 1));
     for y in from_y..=to_y {
         for x in from_x..=to_x {
             let at = Vector2::new(x as f64 - rough.x, y as f64 - rough.y);
-            if at.norm() <= window {
+            if at.norm() <= radius && window.is_clear(at) {
                 samples.push(Sample { at, value: grey.pixel(x, y) });
             }
         }

@@ -5,8 +5,8 @@ use nalgebra::Vector2;
 
 use super::board::Board;
 use super::grey::Grey;
-use crate::frame::Frame;
 use crate::geometry::ImagePoint;
+use crate::vision::rank;
 
 /// Blur from which on a picture is refused \[px\], or as a share of a square's side.
 const BLURRED_PX: f64 = 3.5;
@@ -18,6 +18,8 @@ const MOVED_RATIO: f64 = 1.5;
 /// Half the length over which an edge is looked at, as a share of a square's side.
 const REACH: f64 = 0.35;
 const LONGEST_REACH_PX: f64 = 15.0;
+/// The same as a share of the plain border about a marker.
+const CLEAR: f64 = 0.9;
 /// Step of the profile across an edge \[px\].
 const STEP_PX: f64 = 0.25;
 /// Part of a square's side that is left out at both of its ends.
@@ -52,26 +54,27 @@ pub enum Unsharp {
 }
 
 impl Focus {
-    /// Of a board whose corners were found. `None` where no edge between them shows.
-    pub fn of(board: &Board, frame: &Frame, corners: &[ImagePoint]) -> Option<Self> {
+    /// Of a board whose corners were found, row by row as far as they were. `None` where
+    /// no edge between them shows.
+    pub fn of(board: &Board, grey: &Grey<'_>, corners: &[Option<ImagePoint>]) -> Option<Self> {
         let (columns, rows) = board.corners();
         if corners.len() != columns * rows {
             return None;
         }
-        let grey = Grey::of(frame);
-        let corner = |column: usize, row: usize| corners[row * columns + column];
-        let in_rows: Vec<[ImagePoint; 2]> = (0..(columns - 1) * rows)
-            .map(|i| (i % (columns - 1), i / (columns - 1)))
-            .map(|(column, row)| [corner(column, row), corner(column + 1, row)])
+        let edge = |from: usize, to: usize| Some([corners[from]?, corners[to]?]);
+        let in_rows: Vec<[ImagePoint; 2]> = (0..columns * rows)
+            .filter(|i| i % columns + 1 < columns)
+            .filter_map(|i| edge(i, i + 1))
             .collect();
-        let in_columns: Vec<[ImagePoint; 2]> = (0..columns * (rows - 1))
-            .map(|i| [corner(i % columns, i / columns), corner(i % columns, i / columns + 1)])
-            .collect();
+        let in_columns: Vec<[ImagePoint; 2]> =
+            (0..columns * (rows - 1)).filter_map(|i| edge(i, i + columns)).collect();
+        // What lies beside an edge is plain so far.
+        let reach = REACH.min(CLEAR * board.clear());
         // An edge along a column shows the blur along the rows.
-        let along_rows_px = typical_blur(&grey, &in_columns)?;
-        let along_columns_px = typical_blur(&grey, &in_rows)?;
+        let along_rows_px = typical_blur(grey, &in_columns, reach)?;
+        let along_columns_px = typical_blur(grey, &in_rows, reach)?;
         let sides = in_rows.iter().chain(&in_columns).map(|[from, to]| (to - from).norm());
-        Some(Self { along_rows_px, along_columns_px, square_px: median(sides.collect())? })
+        Some(Self { along_rows_px, along_columns_px, square_px: typical(sides)? })
     }
 
     /// What is wrong with it, if anything.
@@ -88,22 +91,21 @@ impl Focus {
     }
 }
 
-fn typical_blur(grey: &Grey<'_>, edges: &[[ImagePoint; 2]]) -> Option<f64> {
-    median(edges.iter().filter_map(|edge| blur(grey, edge)).collect())
+fn typical_blur(grey: &Grey<'_>, edges: &[[ImagePoint; 2]], reach: f64) -> Option<f64> {
+    typical(edges.iter().filter_map(|edge| blur(grey, edge, reach)))
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+fn typical(values: impl Iterator<Item = f64>) -> Option<f64> {
+    rank::median(&mut values.collect::<Vec<_>>())
 }
 
 /// Blur across an edge between two corners, from its contrast over its steepest
 /// slope, as a Gaussian's would be. `None` outside the picture or without contrast.
-fn blur(grey: &Grey<'_>, [from, to]: &[ImagePoint; 2]) -> Option<f64> {
+fn blur(grey: &Grey<'_>, [from, to]: &[ImagePoint; 2], reach: f64) -> Option<f64> {
     let along = to - from;
     let length = along.norm();
     let across = Vector2::new(-along.y, along.x) / length;
-    let reach = (REACH * length).min(LONGEST_REACH_PX);
+    let reach = (reach * length).min(LONGEST_REACH_PX);
     let steps = count(reach / STEP_PX);
     let samples = count((1.0 - 2.0 * ASIDE) * length).max(1);
     let mean = |aside: f64| -> Option<f64> {

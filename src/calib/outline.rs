@@ -4,7 +4,6 @@
 
 use super::board::Board;
 use super::grey::Grey;
-use crate::frame::Frame;
 use crate::geometry::ImagePoint;
 
 /// Difference between squares of both colours from which on a row of squares belongs
@@ -47,19 +46,18 @@ pub struct Outline {
 
 /// Looks at the two rows of squares beyond each side; says nothing of a side where they
 /// leave the picture.
-pub fn look(board: &Board, frame: &Frame, corners: &[ImagePoint]) -> Outline {
+pub fn look(board: &Board, grey: &Grey<'_>, corners: &[ImagePoint]) -> Outline {
     let mut outline = Outline::default();
     let (columns, rows) = board.corners();
     if corners.len() != columns * rows {
         return outline;
     }
-    let grey = Grey::of(frame);
     let at = |column: usize, row: usize| corners[row * columns + column];
     let inner = (0..(columns - 1) * (rows - 1)).filter_map(|i| {
         let (column, row) = (i % (columns - 1), i / (columns - 1));
         let square =
             [at(column, row), at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)];
-        Some((column + row, colour(&grey, square)?))
+        Some((column + row, colour(grey, square)?))
     });
     let Some((contrast, _)) = difference(inner) else { return outline };
     for side in Side::ALL {
@@ -78,7 +76,7 @@ pub fn look(board: &Board, frame: &Frame, corners: &[ImagePoint]) -> Outline {
                 [line(0, along), first, second]
             })
             .collect();
-        let alternate = |depth: usize| alternate(&grey, &beyond, depth, contrast);
+        let alternate = |depth: usize| alternate(grey, &beyond, depth, contrast);
         if alternate(0) == Some(false) {
             outline.ends_early.push(side);
         } else if alternate(1) == Some(true) {

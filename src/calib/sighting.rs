@@ -1,15 +1,22 @@
 //! What one picture shows of the board, and why some pictures are not used.
 
-use super::board::{Board, NotABoard, Seen, all_seen};
+use super::board::{Board, Marks, NotABoard, Seen};
+use super::charuco::{self, NoMarkers};
 use super::corner;
 use super::focus::{Focus, Unsharp};
+use super::grey::Grey;
 use super::outline::{self, Outline, Side};
 use crate::bridge::{self, BridgeError};
 use crate::frame::Frame;
+use crate::geometry::ImagePoint;
 
 /// Mean shift of the corners below which two pictures show the board in one place
 /// \[px\]: they say the same twice, and count as one.
 const SAME_PLACE_PX: f64 = 1.0;
+/// Corners of a board with markers that must show, and in so many of its rows and
+/// columns.
+const LEAST_CORNERS: usize = 8;
+const LEAST_LINES: usize = 3;
 
 /// The board as one picture shows it.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,6 +118,27 @@ pub enum Refusal {
         /// The size of most pictures \[px\].
         expected: [u32; 2],
     },
+    /// A board with markers where a plain one was told.
+    #[error(
+        "a board with markers shows, not a plain one: give --marker-mm, and --dictionary if its \
+         markers are not of 4x4 cells"
+    )]
+    Marked,
+    /// A plain board where one with markers was told.
+    #[error("a plain checkerboard shows, not one with markers: leave out --marker-mm")]
+    Plain,
+    /// The markers do not make the board.
+    #[error(transparent)]
+    NoMarkers(#[from] NoMarkers),
+    /// Too little of a board with markers.
+    #[error(
+        "only {count} corners of the board show: {LEAST_CORNERS} in {LEAST_LINES} rows and columns \
+         are needed"
+    )]
+    Little {
+        /// Corners that show.
+        count: usize,
+    },
     /// OpenCV gave up on it.
     #[error(transparent)]
     Bridge(#[from] BridgeError),
@@ -132,26 +160,12 @@ fn sides_text(sides: &[Side]) -> String {
 
 /// Looks for the board in a picture.
 pub fn look(board: &Board, name: &str, frame: &Frame) -> Result<Sighting, Refusal> {
-    let expected = board.corners();
-    let (columns, rows) = expected;
-    let Some(corners) = bridge::find_board(frame, expected)? else {
-        return Err(match bridge::find_any_board(frame)? {
-            Some(found) if turned_like(found, expected) != expected => {
-                Refusal::OtherBoard { found: turned_like(found, expected), expected }
-            }
-            _ => Refusal::NoBoard { columns, rows },
-        });
+    let grey = Grey::of(frame);
+    let corners = match board.marks() {
+        None => checkerboard(board, frame, &grey)?,
+        Some(marks) => with_markers(board, marks, frame, &grey)?,
     };
-    let corners = board.order(corners)?;
-    let Outline { goes_on, ends_early } = outline::look(board, frame, &corners);
-    if !ends_early.is_empty() {
-        return Err(Refusal::Smaller { columns, rows, sides: ends_early });
-    }
-    if !goes_on.is_empty() {
-        return Err(Refusal::Larger { columns, rows, sides: goes_on });
-    }
-    let corners = corner::refine(board, frame, &corners);
-    let focus = Focus::of(board, frame, &corners);
+    let focus = Focus::of(board, &grey, &corners);
     match focus.and_then(|focus| focus.fault()) {
         Some(Unsharp::Blurred { blur_px }) => return Err(Refusal::Blurred { blur_px }),
         Some(Unsharp::Moved { way_px }) => return Err(Refusal::Moved { way_px }),
@@ -159,7 +173,76 @@ pub fn look(board: &Board, name: &str, frame: &Frame) -> Result<Sighting, Refusa
     }
     let side = |px: usize| u32::try_from(px).unwrap_or(u32::MAX);
     let image_size_px = [side(frame.width()), side(frame.height())];
-    Ok(Sighting { name: name.to_owned(), image_size_px, corners: all_seen(&corners), focus })
+    let corners = corners.iter().enumerate();
+    let corners = corners.filter_map(|(index, px)| Some(Seen { index, px: (*px)? })).collect();
+    Ok(Sighting { name: name.to_owned(), image_size_px, corners, focus })
+}
+
+/// All corners of a plain board.
+fn checkerboard(
+    board: &Board,
+    frame: &Frame,
+    grey: &Grey<'_>,
+) -> Result<Vec<Option<ImagePoint>>, Refusal> {
+    let expected = board.corners();
+    let (columns, rows) = expected;
+    let Some(corners) = bridge::find_board(frame, expected)? else {
+        return Err(match bridge::find_any_board(frame)? {
+            Some(found) if turned_like(found, expected) != expected => {
+                Refusal::OtherBoard { found: turned_like(found, expected), expected }
+            }
+            _ if charuco::shows(frame)? => Refusal::Marked,
+            _ => Refusal::NoBoard { columns, rows },
+        });
+    };
+    let corners = board.order(corners)?;
+    let Outline { goes_on, ends_early } = outline::look(board, grey, &corners);
+    if !ends_early.is_empty() {
+        return Err(Refusal::Smaller { columns, rows, sides: ends_early });
+    }
+    if !goes_on.is_empty() {
+        return Err(Refusal::Larger { columns, rows, sides: goes_on });
+    }
+    let rough: Vec<Option<ImagePoint>> = corners.into_iter().map(Some).collect();
+    let refined = corner::refine(board, grey, &rough, false);
+    // One that does not fit was seen, and stays where it is.
+    Ok(refined.into_iter().zip(rough).map(|(refined, rough)| refined.or(rough)).collect())
+}
+
+/// The corners of a board with markers that are in the picture, and not covered.
+fn with_markers(
+    board: &Board,
+    marks: Marks,
+    frame: &Frame,
+    grey: &Grey<'_>,
+) -> Result<Vec<Option<ImagePoint>>, Refusal> {
+    let found = match charuco::find(board, marks, frame)? {
+        Ok(found) => found,
+        Err(NoMarkers::None { .. }) if bridge::find_any_board(frame)?.is_some() => {
+            return Err(Refusal::Plain);
+        }
+        Err(reason) => return Err(reason.into()),
+    };
+    let refined = corner::refine(board, grey, &found.expected, found.first_has_marker);
+    let seen: Vec<Option<ImagePoint>> = refined
+        .into_iter()
+        .zip(found.is_beside)
+        .map(|(px, is_beside)| px.filter(|_| is_beside))
+        .collect();
+    let (columns, _) = board.corners();
+    let lines = |line: &dyn Fn(usize) -> usize| {
+        let mut lines: Vec<usize> =
+            (0..seen.len()).filter(|&i| seen[i].is_some()).map(line).collect();
+        lines.sort_unstable();
+        lines.dedup();
+        lines.len()
+    };
+    let count = seen.iter().flatten().count();
+    let fewer = lines(&|i| i % columns).min(lines(&|i| i / columns));
+    if count < LEAST_CORNERS || fewer < LEAST_LINES {
+        return Err(Refusal::Little { count });
+    }
+    Ok(seen)
 }
 
 /// The longer side first if it is so on the other board: a plain board does not tell
@@ -192,12 +275,12 @@ pub fn agree_on_size(looks: &mut Looks) {
 
 /// Keeps one of the pictures that show the board in one place, the first, and refuses
 /// the others.
-pub fn take_out_duplicates(looks: &mut Looks) {
+pub fn take_out_duplicates(board: &Board, looks: &mut Looks) {
     for later in 1..looks.len() {
         let Ok(sighting) = &looks[later].1 else { continue };
         let twin = looks[..later].iter().find_map(|(_, look)| {
             let earlier = look.as_ref().ok()?;
-            let shift_px = shift_px(earlier, sighting)?;
+            let shift_px = shift_px(board, &earlier.corners, &sighting.corners)?;
             (shift_px < SAME_PLACE_PX).then(|| (earlier.name.clone(), shift_px))
         });
         if let Some((of, shift_px)) = twin {
@@ -206,21 +289,27 @@ pub fn take_out_duplicates(looks: &mut Looks) {
     }
 }
 
-/// Mean distance between the corners that two pictures share \[px\], whichever way
-/// round a plain board was counted. `None` without such corners.
-pub fn shift_px(a: &Sighting, b: &Sighting) -> Option<f64> {
-    let (first, last) = (a.corners.first()?.index, a.corners.last()?.index);
-    let straight = mean_distance(a, b, |index| index);
-    let turned = mean_distance(a, b, |index| (first + last).wrapping_sub(index));
-    [straight, turned].into_iter().flatten().reduce(f64::min)
+/// Whether two pictures show the board in one place.
+pub fn is_same_place(board: &Board, a: &[Seen], b: &[Seen]) -> bool {
+    shift_px(board, a, b).is_some_and(|shift_px| shift_px < SAME_PLACE_PX)
 }
 
-fn mean_distance(a: &Sighting, b: &Sighting, of: impl Fn(usize) -> usize) -> Option<f64> {
+/// Mean distance between the corners that two pictures share \[px\], whichever way
+/// round a plain board was counted. `None` without such corners.
+pub fn shift_px(board: &Board, a: &[Seen], b: &[Seen]) -> Option<f64> {
+    let (columns, rows) = board.corners();
+    let last = columns * rows - 1;
+    let straight = mean_distance(a, b, |index| index);
+    let turned = board.is_plain().then(|| mean_distance(a, b, |index| last.wrapping_sub(index)));
+    [straight, turned.flatten()].into_iter().flatten().reduce(f64::min)
+}
+
+fn mean_distance(a: &[Seen], b: &[Seen], of: impl Fn(usize) -> usize) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0.0);
-    for corner in &a.corners {
+    for corner in a {
         let index = of(corner.index);
-        if let Ok(other) = b.corners.binary_search_by_key(&index, |other| other.index) {
-            sum += (b.corners[other].px - corner.px).norm();
+        if let Ok(other) = b.binary_search_by_key(&index, |other| other.index) {
+            sum += (b[other].px - corner.px).norm();
             count += 1.0;
         }
     }
@@ -231,6 +320,8 @@ fn mean_distance(a: &Sighting, b: &Sighting, of: impl Fn(usize) -> usize) -> Opt
 mod tests {
     use super::*;
     use crate::calib::Camera;
+    use crate::calib::board::all_seen;
+    use crate::calib::dictionary::Dictionary;
     use crate::calib::synthetic::{self, poses};
     use crate::frame::Pixels;
     use crate::geometry::Pose;
@@ -286,6 +377,115 @@ mod tests {
         assert_eq!(none, Refusal::NoBoard { columns: 9, rows: 6 });
     }
 
+    fn marked(columns: usize, rows: usize, dictionary: Dictionary) -> Board {
+        let marks = Marks { side: Mm::constant(14.0), dictionary };
+        board(columns, rows).with_marks(marks).unwrap()
+    }
+
+    /// A picture of a board whose middle is somewhere before the camera.
+    fn picture(shown: &Board, at: Vector3<f64>, seed: u64) -> (Frame, Vec<Option<ImagePoint>>) {
+        let camera = Camera::pinhole([900.0, 902.0], [323.0, 238.0])
+            .with_five([-0.25, 0.05, 1e-3, -5e-4, 0.0]);
+        let (columns, rows) = shown.corners();
+        #[expect(clippy::cast_precision_loss, reason = "a handful of corners")]
+        let middle = Vector3::new(columns as f64 - 1.0, rows as f64 - 1.0, 0.0) * 10.0;
+        let pose = Pose::new(Vector3::new(0.25, -0.2, 0.3), Vector3::zeros());
+        let pose = Pose::from_parts(pose.rotation(), at - pose.rotation() * middle);
+        let studio = BoardStudio::new(&camera, [640, 480]);
+        let frame = studio.take(shown, &pose, Exposure::SHARP, seed).unwrap();
+        let truth = shown.corners_mm().iter().map(|p| camera.project(pose.apply(*p))).collect();
+        (frame, truth)
+    }
+
+    fn off_px(sighting: &Sighting, truth: &[Option<ImagePoint>]) -> f64 {
+        let squares =
+            sighting.corners.iter().map(|c| (c.px - truth[c.index].unwrap()).norm_squared());
+        #[expect(clippy::cast_precision_loss, reason = "a count of corners")]
+        let count = sighting.corners.len() as f64;
+        (squares.sum::<f64>() / count).sqrt()
+    }
+
+    #[test]
+    fn corners_between_markers_are_found_as_well_as_those_of_a_plain_board() {
+        for dictionary in Dictionary::ALL {
+            let shown = marked(9, 6, dictionary);
+            let (frame, truth) = picture(&shown, Vector3::new(0.0, 0.0, 420.0), 5);
+            let sighting = look(&shown, "a", &frame).unwrap();
+            assert_eq!(sighting.corners.len(), 54);
+            let off = off_px(&sighting, &truth);
+            assert!(off < 0.04, "{}: {off}", dictionary.name());
+        }
+    }
+
+    #[test]
+    fn a_board_that_is_partly_in_the_picture_is_seen_as_far_as_it_is() {
+        let shown = marked(9, 6, Dictionary::Four);
+        let (frame, truth) = picture(&shown, Vector3::new(110.0, 50.0, 420.0), 6);
+        let sighting = look(&shown, "a", &frame).unwrap();
+        let inside =
+            |px: &ImagePoint| (12.0..627.0).contains(&px.x) && (12.0..467.0).contains(&px.y);
+        let whole = truth.iter().flatten().filter(|px| inside(px)).count();
+        let found = sighting.corners.len();
+        assert!(found < 45 && found + 6 >= whole && whole + 6 >= found, "{found} of {whole}");
+        let off = off_px(&sighting, &truth);
+        assert!(off < 0.05, "{off}");
+        // Too little of it.
+        let (frame, _) = picture(&shown, Vector3::new(215.0, 50.0, 420.0), 6);
+        let little = look(&shown, "a", &frame).unwrap_err();
+        assert!(
+            matches!(little, Refusal::Little { .. } | Refusal::NoMarkers(NoMarkers::None { .. })),
+            "{little}"
+        );
+    }
+
+    fn mirrored(frame: &Frame) -> Frame {
+        let (width, _) = frame.size();
+        let rows = frame.to_grey8();
+        let turned = rows.chunks(width).flat_map(|row| row.iter().rev().copied()).collect();
+        Frame::new(0, Stamp::START, frame.size(), Pixels::Grey8(turned)).unwrap()
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_board_with_markers_is_told() {
+        let at = Vector3::new(0.0, 0.0, 420.0);
+        let shown = marked(9, 6, Dictionary::Four);
+        let (frame, _) = picture(&shown, at, 7);
+        let said =
+            |expected: &Board, frame: &Frame| look(expected, "a", frame).unwrap_err().to_string();
+        let mirror = said(&shown, &mirrored(&frame));
+        assert!(mirror.contains("the board is mirrored"), "{mirror}");
+        let other = said(&marked(9, 6, Dictionary::Five), &frame);
+        assert_eq!(other, "markers of 4x4 cells show, not of 5x5: correct --dictionary");
+        let counts = said(&marked(7, 6, Dictionary::Four), &frame);
+        assert!(counts.contains("not in the order of a board with 7x6 inner corners"), "{counts}");
+        assert!(counts.contains("they fit one of 9 columns"), "{counts}");
+        let marks = Marks { side: Mm::constant(9.0), dictionary: Dictionary::Four };
+        let size = said(&board(9, 6).with_marks(marks).unwrap(), &frame);
+        assert!(size.starts_with("the markers measure 6"), "{size}");
+        assert!(size.contains("% of a square's side, not 45 %"), "{size}");
+        let plain = said(&shown, &picture(&board(9, 6), at, 7).0);
+        assert!(plain.contains("a plain checkerboard shows"), "{plain}");
+        let with = said(&board(9, 6), &frame);
+        assert!(with.contains("give --marker-mm"), "{with}");
+        let none =
+            Frame::new(0, Stamp::START, (400, 300), Pixels::Grey8(vec![90; 120_000])).unwrap();
+        assert_eq!(said(&shown, &none), "no board with markers of 4x4 cells: 0 of them show");
+    }
+
+    #[test]
+    fn a_board_with_markers_tells_half_a_turn() {
+        let shown = marked(9, 6, Dictionary::Four);
+        let (frame, truth) = picture(&shown, Vector3::new(0.0, 0.0, 420.0), 8);
+        let turned: Vec<u8> = frame.to_grey8().iter().rev().copied().collect();
+        let turned = Frame::new(0, Stamp::START, frame.size(), Pixels::Grey8(turned)).unwrap();
+        let sighting = look(&shown, "a", &turned).unwrap();
+        let truth: Vec<_> = truth
+            .iter()
+            .map(|px| px.map(|px| ImagePoint::new(639.0 - px.x, 479.0 - px.y)))
+            .collect();
+        assert!(off_px(&sighting, &truth) < 0.05);
+    }
+
     #[test]
     fn blur_is_told_from_motion() {
         let blurred = Exposure { blur_px: 5.0, ..Exposure::SHARP };
@@ -317,7 +517,7 @@ mod tests {
         let places: Vec<_> = turned.corners.iter().rev().map(|corner| corner.px).collect();
         turned.corners = all_seen(&places);
         looks.push(("d".to_owned(), Ok(turned)));
-        take_out_duplicates(&mut looks);
+        take_out_duplicates(&board(9, 6), &mut looks);
         let said: Vec<bool> = looks.iter().map(|look| look.1.is_ok()).collect();
         assert_eq!(said, [true, false, true, false]);
         let words = looks[1].1.as_ref().unwrap_err().to_string();

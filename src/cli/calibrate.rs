@@ -14,8 +14,9 @@ use rayon::prelude::*;
 
 use self::plane::Plane;
 use super::WrongArguments;
-use crate::calib::board::Board;
+use crate::calib::board::{Board, Marks};
 use crate::calib::covariance::Covariance;
+use crate::calib::dictionary::Dictionary;
 use crate::calib::map::{self, WidthMap};
 use crate::calib::next_view::{self, NextView};
 use crate::calib::quality;
@@ -90,14 +91,31 @@ pub struct BoardArgs {
     /// Side of one square [mm]
     #[arg(long, value_name = "MM", value_parser = parse_square)]
     square_mm: Mm,
+    #[expect(clippy::doc_markdown, reason = "shown by --help as it is")]
+    /// Side of the markers, with their black border, where the board is a ChArUco one [mm]
+    /// [default: none, a plain checkerboard]
+    #[arg(long, value_name = "MM", value_parser = parse_square)]
+    marker_mm: Option<Mm>,
+    /// Cells of such markers: 4x4, 5x5, 6x6 or 7x7, or OpenCV's name of the dictionary
+    #[arg(long, value_name = "NAME", default_value = "4x4", value_parser = parse_dictionary)]
+    dictionary: Dictionary,
 }
 
 impl BoardArgs {
     /// Fails for a board that cannot be used.
     pub fn board(&self) -> Result<Board, WrongArguments> {
         let (columns, rows) = self.board;
-        Board::new(columns, rows, self.square_mm).map_err(WrongArguments::new)
+        let plain = Board::new(columns, rows, self.square_mm).map_err(WrongArguments::new)?;
+        let Some(side) = self.marker_mm else { return Ok(plain) };
+        let marks = Marks { side, dictionary: self.dictionary };
+        plain.with_marks(marks).map_err(WrongArguments::new)
     }
+}
+
+fn parse_dictionary(text: &str) -> Result<Dictionary, String> {
+    Dictionary::named(text).ok_or_else(|| {
+        "expected 4x4, 5x5, 6x6 or 7x7, or a name of OpenCV's such as DICT_5X5_100".to_owned()
+    })
 }
 
 fn parse_board(text: &str) -> Result<(usize, usize), String> {
@@ -143,7 +161,7 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     plane::check(&args.plane, &files)?;
     let mut looks = look_at_all(&board, &files);
     sighting::agree_on_size(&mut looks);
-    sighting::take_out_duplicates(&mut looks);
+    sighting::take_out_duplicates(&board, &mut looks);
     let seen: Vec<Sighting> = looks.iter().filter_map(|(_, look)| look.clone().ok()).collect();
     let solution = solve::solve(&board, &seen).inspect_err(|_| say(&report::refusals(&looks)))?;
     say(&report::images(&looks, &solution));

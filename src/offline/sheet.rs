@@ -86,6 +86,7 @@ impl Sheet {
             .filter(|(column, row)| (column + row) % 2 == 0)
             .map(|(column, row)| [left + column as f64 * side, top + row as f64 * side, side, side])
             .collect();
+        black.extend(markers(board, (left, top)));
         let middle = paper.width_mm / 2.0;
         let has_room = paper.width_mm >= BAR_MM[0] + 2.0 * MARGIN_MM;
         let bar = if has_room { BAR_MM[0] } else { BAR_MM[1] };
@@ -103,11 +104,16 @@ impl Sheet {
             (
                 middle,
                 base + 9.5,
-                format!("truebead: --board {columns}x{rows} --square-mm {}", shown(side)),
+                format!(
+                    "truebead: --board {columns}x{rows} --square-mm {}{}",
+                    shown(side),
+                    options(board)
+                ),
             ),
         ];
+        let kind = if board.is_plain() { "Checkerboard" } else { "ChArUco board" };
         let title =
-            format!("Checkerboard, {columns}x{rows} inner corners, squares of {} mm", shown(side));
+            format!("{kind}, {columns}x{rows} inner corners, squares of {} mm", shown(side));
         Ok(Self { paper, title, black, words })
     }
 
@@ -182,6 +188,38 @@ impl Sheet {
     }
 }
 
+/// The black cells of all markers, those that are neighbours in a row as one, so that no
+/// hair line shows between them.
+#[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
+fn markers(board: &Board, (left, top): (f64, f64)) -> Vec<[f64; 4]> {
+    let Some(marks) = board.marks() else { return Vec::new() };
+    let (columns, rows) = board.corners();
+    let square = board.square().get();
+    let cell = marks.side.get() / (marks.dictionary.side() + 2) as f64;
+    let mut black: Vec<[f64; 4]> = Vec::new();
+    for (column, row) in (0..=rows).flat_map(|row| (0..=columns).map(move |column| (column, row))) {
+        let x = left + (column as f64 + board.clear()) * square;
+        let y = top + (row as f64 + board.clear()) * square;
+        let mut last = None;
+        for (across, down) in board.black_cells(column, row) {
+            let is_next = last.is_some_and(|(before, row)| (before + 1, row) == (across, down));
+            match black.last_mut().filter(|_| is_next) {
+                Some(run) => run[2] += cell,
+                None => black.push([x + across as f64 * cell, y + down as f64 * cell, cell, cell]),
+            }
+            last = Some((across, down));
+        }
+    }
+    black
+}
+
+/// The options that tell a board's markers.
+fn options(board: &Board) -> String {
+    board.marks().map_or_else(String::new, |marks| {
+        format!(" --marker-mm {} --dictionary {}", shown(marks.side.get()), marks.dictionary.name())
+    })
+}
+
 /// A bar with a mark every centimetre, long ones at its ends and its middle.
 fn ruler(left: f64, base: f64, length: f64) -> Vec<[f64; 4]> {
     let marks = [BAR_MM[0], BAR_MM[1]]
@@ -223,6 +261,8 @@ fn shown(mm: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calib::board::Marks;
+    use crate::calib::dictionary::Dictionary;
     use crate::units::Mm;
 
     fn board(square: f64) -> Board {
@@ -259,6 +299,26 @@ mod tests {
         // A4 across in points.
         assert!(text.contains("841.8"), "{text}");
         assert!(text.contains("--square-mm 12.5"));
+    }
+
+    #[test]
+    fn markers_are_drawn_in_the_white_squares() {
+        let marks = Marks { side: Mm::constant(12.0), dictionary: Dictionary::Four };
+        let sheet = Sheet::of(&board(20.0).with_marks(marks).unwrap(), A4).unwrap();
+        // The second square of the first row, 20 mm from the left border of the squares,
+        // has the first marker: its second row of cells is black, white, black, white,
+        // white, black.
+        let (left, top) = (sheet.black[0][0] + 20.0 + 4.0, sheet.black[0][1] + 4.0 + 2.0);
+        let in_row =
+            |r: &&[f64; 4]| (r[1] - top).abs() < 1e-9 && (r[0] - left) < 12.0 && r[2] < 20.0;
+        let runs: Vec<[f64; 2]> =
+            sheet.black.iter().filter(in_row).map(|r| [r[0] - left, r[2]]).collect();
+        let expected = [[0.0, 2.0], [4.0, 2.0], [10.0, 2.0]];
+        assert_eq!(runs.len(), 3, "{runs:?}");
+        for (run, expected) in runs.iter().zip(expected) {
+            assert!((run[0] - expected[0]).abs() + (run[1] - expected[1]).abs() < 1e-9, "{runs:?}");
+        }
+        assert!(sheet.svg().contains("--square-mm 20 --marker-mm 12 --dictionary 4x4"));
     }
 
     #[test]

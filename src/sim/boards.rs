@@ -1,4 +1,4 @@
-//! Pictures of a checkerboard before a camera.
+//! Pictures of a checkerboard, plain or with markers, before a camera.
 
 use nalgebra::{Matrix3, Point2, Vector2};
 
@@ -100,6 +100,48 @@ struct Scene {
     /// Squares along its sides.
     squares: Vector2<f64>,
     exposure: Exposure,
+    marks: Option<Marked>,
+}
+
+/// The markers in the white squares.
+struct Marked {
+    /// Cells along a marker's side, and the side of one in squares.
+    cells: (usize, f64),
+    /// Border about a marker, in squares.
+    clear: f64,
+    /// The black cells of every square, row by row.
+    black: Vec<Vec<(usize, usize)>>,
+}
+
+impl Marked {
+    #[expect(clippy::cast_precision_loss, reason = "a handful of cells")]
+    fn of(board: &Board) -> Option<Self> {
+        let count = board.marks()?.dictionary.side() + 2;
+        let (columns, rows) = board.corners();
+        let squares =
+            (0..(columns + 1) * (rows + 1)).map(|i| (i % (columns + 1), i / (columns + 1)));
+        let clear = board.clear();
+        Some(Self {
+            cells: (count, (1.0 - 2.0 * clear) / count as f64),
+            clear,
+            black: squares.map(|(column, row)| board.black_cells(column, row)).collect(),
+        })
+    }
+
+    /// How much of a place in a square is covered by its marker's black.
+    #[expect(clippy::cast_precision_loss, reason = "a handful of cells")]
+    fn cover(&self, square: usize, (u, v): ((f64, f64), (f64, f64))) -> f64 {
+        let Some(black) = self.black.get(square).filter(|black| !black.is_empty()) else {
+            return 0.0;
+        };
+        let (count, side) = self.cells;
+        let along = |(at, blur): (f64, f64)| -> Vec<f64> {
+            let passed = |line: usize| step(at - self.clear - line as f64 * side, blur);
+            (0..count).map(|cell| passed(cell) - passed(cell + 1)).collect()
+        };
+        let (across, down) = (along(u), along(v));
+        black.iter().map(|&(column, row)| across[column] * down[row]).sum()
+    }
 }
 
 impl Scene {
@@ -118,6 +160,7 @@ impl Scene {
             to_board: from_board.try_inverse().unwrap_or_else(Matrix3::zeros),
             squares: Vector2::new(columns as f64 + 1.0, rows as f64 + 1.0),
             exposure,
+            marks: Marked::of(board),
         }
     }
 
@@ -145,6 +188,7 @@ impl Scene {
         let (u, v) = ((at.x, blur(0)), (at.y, blur(1)));
         let white = 0.5 * (WHITE + BLACK);
         let checker = white - 0.5 * (WHITE - BLACK) * wave(u) * wave(v);
+        let checker = checker - (WHITE - BLACK) * self.marker(u, v);
         if beyond.max() < -FAR {
             return checker;
         }
@@ -158,6 +202,20 @@ impl Scene {
         let (on_squares, on_sheet) = (inside(0.0), inside(MARGIN));
         let sheet = WHITE + (checker - WHITE) * on_squares;
         AROUND + (sheet - AROUND) * on_sheet
+    }
+
+    /// How much of a place is covered by a marker's black: that of its own square alone,
+    /// for no marker's blur reaches the next one.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the board")]
+    fn marker(&self, u: (f64, f64), v: (f64, f64)) -> f64 {
+        let Some(marks) = &self.marks else { return 0.0 };
+        let (column, row) = (u.0.floor() + 1.0, v.0.floor() + 1.0);
+        let within = |at: f64, count: f64| (0.0..count).contains(&at);
+        if !within(column, self.squares.x) || !within(row, self.squares.y) {
+            return 0.0;
+        }
+        let square = row as usize * self.squares.x as usize + column as usize;
+        marks.cover(square, ((u.0 - u.0.floor(), u.1), (v.0 - v.0.floor(), v.1)))
     }
 
     fn on_board(&self, ray: Point2<f64>) -> Option<Vector2<f64>> {

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 
 use super::{CalibrateArgs, WrongArguments, look_at};
-use crate::calib::board::Board;
+use crate::calib::board::{Board, Seen};
 use crate::calib::equations::Corner;
 use crate::calib::plane::OnBed;
-use crate::calib::sighting::{Looks, Refusal};
+use crate::calib::sighting::{Looks, Refusal, is_same_place};
 use crate::calib::solve::Solution;
 use crate::units::Mm;
 
@@ -17,8 +17,6 @@ use crate::units::Mm;
 /// this camera, or the boards lay on no plane.
 const OFF: f64 = 4.0;
 const OFF_PX: f64 = 0.3;
-/// Mean shift of the corners below which two boards are in one place \[px\].
-const SAME_PLACE_PX: f64 = 1.0;
 
 /// The bed plane and where it comes from.
 pub struct Plane {
@@ -69,16 +67,17 @@ pub fn find(
     solution: &Solution,
     (files, looks): (&[PathBuf], &Looks),
 ) -> anyhow::Result<Plane> {
-    let mut found: Vec<(String, Vec<Corner>)> = Vec::new();
+    let mut found: Vec<(String, Vec<Seen>)> = Vec::new();
     let mut passed_over = Vec::new();
     if args.plane.is_empty() {
         let (last, later) = last_seen(solution, looks).context("no picture shows the board")?;
-        found.push((last.to_owned(), corners_of(board, solution, last).unwrap_or_default()));
+        found.push((last.to_owned(), corners_of(solution, last).unwrap_or_default()));
         passed_over = later;
     }
     for path in &args.plane {
         let (image, corners) = on_bed(path, board, solution, (files, looks))?;
-        if let Some((twin, _)) = found.iter().find(|(_, other)| is_same_place(other, &corners)) {
+        let is_twin = |(_, other): &&(String, Vec<Seen>)| is_same_place(board, other, &corners);
+        if let Some((twin, _)) = found.iter().find(is_twin) {
             bail!(
                 "--plane {image}: the board is where it is in {twin}, which says nothing new; leave \
                  one of them out, or move the board on the bed"
@@ -86,7 +85,8 @@ pub fn find(
         }
         found.push((image, corners));
     }
-    let (images, boards): (Vec<String>, Vec<Vec<Corner>>) = found.into_iter().unzip();
+    let (images, boards): (Vec<String>, Vec<Vec<Corner>>) =
+        found.into_iter().map(|(image, seen)| (image, board.place(&seen))).unzip();
     let on_bed = OnBed::fit(&solution.model, boards)
         .with_context(|| format!("the corners in {} fit no plane", images.join(", ")))?;
     let most_px = (OFF * solution.rms_px).max(OFF_PX);
@@ -135,9 +135,8 @@ fn last_seen<'a>(solution: &'a Solution, looks: &'a Looks) -> Option<(&'a str, V
     None
 }
 
-fn corners_of(board: &Board, solution: &Solution, name: &str) -> Option<Vec<Corner>> {
-    let view = solution.views.iter().find(|view| view.name == name)?;
-    Some(board.place(&view.corners))
+fn corners_of(solution: &Solution, name: &str) -> Option<Vec<Seen>> {
+    solution.views.iter().find(|view| view.name == name).map(|view| view.corners.clone())
 }
 
 /// The board's corners in the named picture: out of the folder's where it took part,
@@ -147,12 +146,12 @@ fn on_bed(
     board: &Board,
     solution: &Solution,
     (files, looks): (&[PathBuf], &Looks),
-) -> anyhow::Result<(String, Vec<Corner>)> {
+) -> anyhow::Result<(String, Vec<Seen>)> {
     if let Some((file, (name, look))) =
         index_of(path, files).and_then(|index| Some((files.get(index)?, looks.get(index)?)))
     {
         return match look {
-            Ok(_) => corners_of(board, solution, name)
+            Ok(_) => corners_of(solution, name)
                 .map(|corners| (name.clone(), corners))
                 .with_context(|| format!("--plane {name}: not used")),
             // A board that is in one place twice still lies on the bed.
@@ -169,7 +168,7 @@ fn looked_for(
     path: &Path,
     board: &Board,
     solution: &Solution,
-) -> anyhow::Result<(String, Vec<Corner>)> {
+) -> anyhow::Result<(String, Vec<Seen>)> {
     let name = path.display().to_string();
     let sighting = look_at(board, &name, path)
         .with_context(|| format!("--plane {name} does not show the bed plane"))?;
@@ -178,14 +177,5 @@ fn looked_for(
             Refusal::Size { found: sighting.image_size_px, expected: solution.image_size_px };
         bail!("--plane {name}: {refusal}");
     }
-    Ok((name, board.place(&sighting.corners)))
-}
-
-/// Whether two pictures show the board in one place.
-fn is_same_place(a: &[Corner], b: &[Corner]) -> bool {
-    #[expect(clippy::cast_precision_loss, reason = "a count of corners")]
-    let count = a.len().max(1) as f64;
-    let straight: f64 = a.iter().zip(b).map(|(a, b)| (a.seen - b.seen).norm()).sum();
-    let turned: f64 = a.iter().zip(b.iter().rev()).map(|(a, b)| (a.seen - b.seen).norm()).sum();
-    a.len() == b.len() && straight.min(turned) / count < SAME_PLACE_PX
+    Ok((name, sighting.corners))
 }

@@ -1,0 +1,64 @@
+//! Dark quadrilaterals in a picture: what may be a marker.
+
+use nalgebra::Point2;
+use opencv::core::{Mat, Point, Vector};
+use opencv::imgproc::{
+    ADAPTIVE_THRESH_MEAN_C, CHAIN_APPROX_SIMPLE, RETR_LIST, THRESH_BINARY_INV, adaptive_threshold,
+    approx_poly_dp, arc_length, contour_area, find_contours_def, is_contour_convex,
+};
+
+use super::{BridgeError, during, grey8_mat, prepare};
+use crate::frame::Frame;
+use crate::geometry::ImagePoint;
+
+/// Sides of the squares over which a pixel is compared with the mean \[px\]: a marker's
+/// border must be dark in one of them at least.
+const NEIGHBOURHOODS_PX: [i32; 4] = [11, 23, 47, 95];
+/// Grey levels that dark is darker than the mean.
+const DARKER: f64 = 7.0;
+/// Least circumference of a quadrilateral \[px\].
+const LEAST_ROUND_PX: f64 = 28.0;
+/// Least area over that of a square with the same circumference.
+const LEAST_FULL: f64 = 0.25;
+/// How far an outline may be off straight sides, as a share of its length.
+const STRAIGHT: f64 = 0.04;
+
+/// Corners of dark convex quadrilaterals \[px\], to about a pixel, in the order in which
+/// they are passed clockwise in the picture. The same one may be found several times.
+pub fn find_quads(frame: &Frame) -> Result<Vec<[ImagePoint; 4]>, BridgeError> {
+    prepare();
+    let image = grey8_mat(frame)?;
+    let mut quads = Vec::new();
+    for side in NEIGHBOURHOODS_PX {
+        quads.extend(dark(&image, side).map_err(during("finding markers"))?);
+    }
+    Ok(quads)
+}
+
+fn dark(image: &Mat, neighbourhood: i32) -> opencv::Result<Vec<[ImagePoint; 4]>> {
+    let mut mask = Mat::default();
+    let (mean, inverse) = (ADAPTIVE_THRESH_MEAN_C, THRESH_BINARY_INV);
+    adaptive_threshold(image, &mut mask, 255.0, mean, inverse, neighbourhood, DARKER)?;
+    let mut outlines = Vector::<Vector<Point>>::new();
+    find_contours_def(&mask, &mut outlines, RETR_LIST, CHAIN_APPROX_SIMPLE)?;
+    let mut quads = Vec::new();
+    for outline in outlines {
+        let round = arc_length(&outline, true)?;
+        if round < LEAST_ROUND_PX {
+            continue;
+        }
+        let mut corners = Vector::<Point>::new();
+        approx_poly_dp(&outline, &mut corners, STRAIGHT * round, true)?;
+        if corners.len() != 4 || !is_contour_convex(&corners)? {
+            continue;
+        }
+        let area = contour_area(&corners, true)?;
+        if area.abs() < LEAST_FULL * (round / 4.0).powi(2) {
+            continue;
+        }
+        let at = |i: usize| corners.get(i).map(|p| Point2::new(f64::from(p.x), f64::from(p.y)));
+        let order = if area > 0.0 { [0, 1, 2, 3] } else { [3, 2, 1, 0] };
+        quads.push([at(order[0])?, at(order[1])?, at(order[2])?, at(order[3])?]);
+    }
+    Ok(quads)
+}
