@@ -163,7 +163,8 @@ fn open_camera(
 ) -> Result<(Box<dyn FrameSource>, Option<RobotView>), LiveError> {
     let camera = &live.run.camera;
     if camera.source != Source::Rendered {
-        return Ok((open::live(camera, live.cell.channel, live.clock, ending)?, None));
+        let options = open::LiveOptions::of(camera, live.cell.channel);
+        return Ok((open::live(options, live.clock, ending)?, None));
     }
     let simulation = &live.cell.simulation;
     let renderer = Renderer::new(

@@ -28,6 +28,8 @@ pub struct Trial {
     /// The same of pictures that took no part in fitting the camera, each left out
     /// once \[px\]; `None` where the others do not settle the camera.
     pub held_out_px: Option<f64>,
+    /// Whether the lens turns over within the picture: then it is taken only if all do.
+    pub folds: bool,
 }
 
 /// The best choice and all that was tried. `None` where no lens leads to a camera.
@@ -63,7 +65,9 @@ pub(super) fn best(views: &Views) -> Option<(Fit, Free, Vec<Trial>)> {
 /// with the fewest coefficients. `None` without a fit.
 fn chosen(fits: &[(Fit, Trial)]) -> Option<usize> {
     let is_rational = |trial: &Trial| trial.free.lens == Some(Lens::Rational);
-    let held_out = |(_, trial): &(Fit, Trial)| trial.held_out_px;
+    let all_fold = fits.iter().all(|(_, trial)| trial.folds);
+    let held_out =
+        |(_, trial): &(Fit, Trial)| trial.held_out_px.filter(|_| all_fold || !trial.folds);
     let simpler = fits.iter().filter(|(_, trial)| !is_rational(trial));
     let least = simpler.filter_map(held_out).fold(f64::INFINITY, f64::min);
     let is_as_good = |fit: &(Fit, Trial)| {
@@ -89,18 +93,16 @@ pub(super) fn up_to(views: &Views, lens: Lens) -> Option<(Fit, Trial)> {
 }
 
 fn is_bent(views: &Views, fit: &Fit, free: Free) -> bool {
-    let (Some(variance), Some(spreads)) =
-        (Some(views.noise_variance_px2(fit, free)), views.spreads(fit, free))
-    else {
-        return false;
-    };
+    let variance = views.noise_variance_px2(fit, free);
+    let Some(spreads) = views.spreads(fit, free) else { return false };
     let sigma = |side: usize| spreads[SHARED - 2 + side] * variance.sqrt();
     (0..2).any(|side| fit.model.bend_mm[side].abs() > BELIEVED_BEND * sigma(side))
 }
 
 fn trial(views: &Views, fit: &Fit, free: Free) -> Trial {
     let rms_px = views.rms_px(fit.squares_px2);
-    Trial { free, rms_px, held_out_px: held_out_px(views, fit, free) }
+    let folds = fit.model.camera.fold(views.size).is_some();
+    Trial { free, rms_px, held_out_px: held_out_px(views, fit, free), folds }
 }
 
 /// Root mean square error of each picture with the camera that the others give and

@@ -30,24 +30,12 @@ pub struct WidthMap {
 impl WidthMap {
     /// For beads of a width on a surface.
     pub fn of(covariance: &Covariance, bead_mm: f64, surface_height: Mm) -> Self {
-        let (columns, rows) = CELLS;
-        let size = covariance.image_size_px().map(f64::from);
-        let middle = |i: u32| {
-            let part = |at: u32, count: u32| (f64::from(at) + 0.5) / f64::from(count);
-            let (x, y) = (part(i % columns, columns), part(i / columns, rows));
-            ImagePoint::new(x * size[0] - 0.5, y * size[1] - 0.5)
-        };
-        let [from, to] = covariance.seen_px();
-        let is_seen =
-            |px: &ImagePoint| (from.x..=to.x).contains(&px.x) && (from.y..=to.y).contains(&px.y);
         let mut worst: Option<f64> = None;
-        let cells = (0..columns * rows)
-            .map(|i| {
-                let beads = [Vector2::x(), Vector2::y()]
-                    .map(|along| ends(covariance, middle(i), along, bead_mm, surface_height));
+        let cells = beads(covariance, bead_mm, surface_height)
+            .map(|beads| {
                 let sigmas = beads.iter().flatten().filter_map(|&ends| {
                     let (_, sigma_mm) = covariance.width_mm(ends, surface_height)?;
-                    if ends.iter().all(is_seen) {
+                    if is_where_seen(covariance, &ends) {
                         worst = Some(worst.map_or(sigma_mm, |worst| worst.max(sigma_mm)));
                     }
                     Some(sigma_mm)
@@ -70,6 +58,41 @@ impl WidthMap {
         let cells = || self.cells.iter().flatten().copied();
         Some((cells().reduce(f64::min)?, cells().reduce(f64::max)?))
     }
+}
+
+/// Ends of beads of a width that lie where boards were seen: those by which
+/// [`WidthMap::worst_where_seen_mm`] is told.
+pub fn where_seen(
+    covariance: &Covariance,
+    bead_mm: f64,
+    surface_height: Mm,
+) -> Vec<[ImagePoint; 2]> {
+    let all = beads(covariance, bead_mm, surface_height).flatten().flatten();
+    all.filter(|ends| is_where_seen(covariance, ends)).collect()
+}
+
+fn is_where_seen(covariance: &Covariance, ends: &[ImagePoint; 2]) -> bool {
+    let [from, to] = covariance.seen_px();
+    ends.iter().all(|px| (from.x..=to.x).contains(&px.x) && (from.y..=to.y).contains(&px.y))
+}
+
+/// Ends of a bead along the picture and of one across it, about the middle of each cell.
+fn beads(
+    covariance: &Covariance,
+    bead_mm: f64,
+    surface_height: Mm,
+) -> impl Iterator<Item = [Option<[ImagePoint; 2]>; 2]> {
+    let (columns, rows) = CELLS;
+    let size = covariance.image_size_px().map(f64::from);
+    let middle = move |i: u32| {
+        let part = |at: u32, count: u32| (f64::from(at) + 0.5) / f64::from(count);
+        let (x, y) = (part(i % columns, columns), part(i / columns, rows));
+        ImagePoint::new(x * size[0] - 0.5, y * size[1] - 0.5)
+    };
+    (0..columns * rows).map(move |i| {
+        [Vector2::x(), Vector2::y()]
+            .map(|along| ends(covariance, middle(i), along, bead_mm, surface_height))
+    })
 }
 
 /// Ends of a bead of this width about a middle, along one axis of the picture.
@@ -144,8 +167,15 @@ mod tests {
     #[test]
     fn the_picture_that_is_asked_for_brings_what_is_said_of_it() {
         let (solution, covariance) = covariance();
-        let next = next_view::best(&board(), &solution, &covariance).unwrap();
+        let heights = [Mm::ZERO, Mm::constant(20.0)];
+        let next = next_view::best(&board(), &solution, &covariance, (40.0, &heights)).unwrap();
         let (before, after) = next.share;
+        // What it begins with is what the maps tell.
+        let worst = heights
+            .map(|height| WidthMap::of(&covariance, 40.0, height).worst_where_seen_mm.unwrap())
+            .into_iter()
+            .fold(0.0, f64::max);
+        assert!((before / (worst / 40.0) - 1.0).abs() < 1e-3, "{before} {worst}");
         assert!(after < 0.97 * before && after > 0.3 * before, "{next:?}");
         assert!(next.to_string().starts_with("the board "), "{next}");
     }

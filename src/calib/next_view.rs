@@ -5,11 +5,13 @@ use nalgebra::{Point3, Rotation3, Vector3};
 use rayon::prelude::*;
 
 use super::board::{Board, all_seen};
-use super::covariance::Covariance;
+use super::covariance::{Covariance, Reading};
 use super::equations::Corner;
+use super::map;
 use super::share;
 use super::solve::Solution;
 use crate::geometry::{ImagePoint, Pose};
+use crate::units::Mm;
 
 /// Tilts that are tried \[degrees\].
 const TILTS_DEG: [f64; 2] = [20.0, 40.0];
@@ -49,11 +51,24 @@ pub enum Hold {
     },
 }
 
-/// The picture that would leave least open in a width where boards were seen.
-/// `None` where no further one brings anything to speak of.
-pub fn best(board: &Board, solution: &Solution, covariance: &Covariance) -> Option<NextView> {
-    let seen = covariance.seen_px();
-    let readings = share::readings(covariance, seen);
+/// The picture that would leave least open in the width of a bead, in mm, on surfaces of
+/// these heights, where boards were seen; where such a bead is not seen whole there, in
+/// that of one that fills a third of that part of the picture. `None` where no further
+/// one brings anything to speak of.
+pub fn best(
+    board: &Board,
+    solution: &Solution,
+    covariance: &Covariance,
+    (bead_mm, heights): (f64, &[Mm]),
+) -> Option<NextView> {
+    let told = heights.iter().flat_map(|&height| {
+        map::where_seen(covariance, bead_mm, height).into_iter().map(move |ends| (ends, height))
+    });
+    let mut beads: Vec<Bead> = told.collect();
+    if beads.is_empty() {
+        beads = share::beads_where_seen(covariance);
+    }
+    let readings = readings(covariance, &beads);
     let before = share::largest(covariance, &readings)?;
     let distance_mm = mean_distance_mm(solution);
     let tried: Vec<NextView> = candidates()
@@ -64,7 +79,7 @@ pub fn best(board: &Board, solution: &Solution, covariance: &Covariance) -> Opti
                     let lies = on_bed(board, covariance, at)?;
                     let corners = seen_whole(board, covariance, &covariance.on_bed(lies))?;
                     let with = covariance.with_another_on_bed(lies, &corners)?;
-                    share::largest(&with, &share::readings(&with, seen))?
+                    share::largest(&with, &self::readings(&with, &beads))?
                 }
                 Hold::Free { .. } => {
                     let pose = pose(board, covariance, (at, hold), distance_mm)?;
@@ -77,6 +92,13 @@ pub fn best(board: &Board, solution: &Solution, covariance: &Covariance) -> Opti
         .collect();
     let best = tried.into_iter().min_by(|a, b| a.share.1.total_cmp(&b.share.1))?;
     (best.share.1 < (1.0 - WORTH) * before).then_some(best)
+}
+
+/// Ends of a bead in the picture, and the height of its surface.
+type Bead = ([ImagePoint; 2], Mm);
+
+fn readings(covariance: &Covariance, beads: &[Bead]) -> Vec<Reading> {
+    beads.iter().filter_map(|&(ends, height)| covariance.width(ends, height)).collect()
 }
 
 fn candidates() -> Vec<((f64, f64), Hold)> {

@@ -4,8 +4,9 @@
 
 use nalgebra::Vector3;
 
+use super::coverage::{CELLS, Coverage};
 use super::solve::{Solution, View};
-use crate::geometry::ImagePoint;
+use crate::vision::rank;
 
 /// A reason for doubt, and what to do about it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -53,7 +54,7 @@ pub enum Doubt {
     },
     /// The distortion polynomial turns over within the picture.
     #[error(
-        "the lens model folds over before pixel ({x:.0}, {y:.0}), and nothing can be measured \
+        "the lens model turns over before pixel ({x:.0}, {y:.0}), and nothing can be measured \
          there; bring the board into the corners of the picture"
     )]
     Folds {
@@ -71,9 +72,6 @@ pub enum Doubt {
 }
 
 const ENOUGH_VIEWS: usize = 8;
-/// The picture is cut into this many parts along each side.
-const GRID: usize = 4;
-const CELLS: usize = GRID * GRID;
 const ENOUGH_CELLS: usize = 12;
 const ENOUGH_TILT_DEG: f64 = 15.0;
 const GOOD_RMS_PX: f64 = 0.5;
@@ -87,7 +85,7 @@ pub fn doubts(solution: &Solution) -> Vec<Doubt> {
     if found < ENOUGH_VIEWS {
         doubts.push(Doubt::FewViews { found });
     }
-    let covered = covered_cells(solution);
+    let covered = Coverage::of(solution).count();
     if covered < ENOUGH_CELLS {
         doubts.push(Doubt::Coverage { covered });
     }
@@ -103,7 +101,7 @@ pub fn doubts(solution: &Solution) -> Vec<Doubt> {
     if percent > GOOD_FOCAL_PERCENT {
         doubts.push(Doubt::LooseFocal { percent });
     }
-    if let Some(px) = first_pixel_without_ray(solution) {
+    if let Some(px) = solution.camera().fold(solution.image_size_px) {
         doubts.push(Doubt::Folds { x: px.x, y: px.y });
     }
     doubts.extend(outliers(&solution.views));
@@ -118,44 +116,16 @@ pub fn settles_camera(solution: &Solution) -> bool {
 
 fn outliers(views: &[View]) -> impl Iterator<Item = Doubt> {
     let mut errors: Vec<f64> = views.iter().map(|view| view.rms_px).collect();
-    errors.sort_by(f64::total_cmp);
-    let typical = errors.get(errors.len() / 2).copied().unwrap_or(f64::INFINITY);
+    let typical = rank::median(&mut errors).unwrap_or(f64::INFINITY);
     let times = move |view: &View| view.rms_px / typical;
     let worse = views.iter().filter(move |view| times(view) > OUTLIER);
     worse.map(move |view| Doubt::Outlier { name: view.name.clone(), times: times(view) })
-}
-
-/// A corner of the picture or the middle of a side that the distortion
-/// polynomial does not reach.
-fn first_pixel_without_ray(solution: &Solution) -> Option<ImagePoint> {
-    let [right, bottom] = solution.image_size_px.map(|side| f64::from(side) - 1.0);
-    let along = |i: u32, end: f64| f64::from(i) / 2.0 * end;
-    (0..9)
-        .map(|i| ImagePoint::new(along(i % 3, right), along(i / 3, bottom)))
-        .find(|&px| solution.camera().ray(px).is_none())
 }
 
 /// Angle between the board's normal and the camera's view \[degrees\].
 pub fn tilt_deg(view: &View) -> f64 {
     let normal = view.pose.rotation() * Vector3::z();
     normal.z.abs().min(1.0).acos().to_degrees()
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "an index into a handful of cells, clamped to them"
-)]
-fn covered_cells(solution: &Solution) -> usize {
-    let [width, height] = solution.image_size_px.map(f64::from);
-    let index =
-        |at: f64, size: f64| (at / size * GRID as f64).clamp(0.0, (GRID - 1) as f64) as usize;
-    let mut seen = [[false; GRID]; GRID];
-    for corner in solution.views.iter().flat_map(|view| &view.corners) {
-        seen[index(corner.px.y, height)][index(corner.px.x, width)] = true;
-    }
-    seen.iter().flatten().filter(|&&cell| cell).count()
 }
 
 #[cfg(test)]
@@ -165,7 +135,7 @@ mod tests {
     use crate::calib::board::all_seen;
     use crate::calib::equations::{Free, Model, SHARED};
     use crate::calib::lens::Lens;
-    use crate::geometry::Pose;
+    use crate::geometry::{ImagePoint, Pose};
     use nalgebra::Vector2;
 
     fn view(name: &str, corner: ImagePoint, tilt_rad: f64, rms_px: f64) -> View {

@@ -22,7 +22,7 @@ const SURFACE: f64 = 0.05;
 /// because a gauge stays in its place, and with it the error. `None` where
 /// no such bead is seen on the surface.
 pub fn where_seen(covariance: &Covariance) -> Option<f64> {
-    largest(covariance, &readings(covariance, covariance.seen_px()))
+    largest(covariance, &readings(covariance))
 }
 
 /// Largest share of beads that were read.
@@ -31,14 +31,17 @@ pub fn largest(covariance: &Covariance, readings: &[Reading]) -> Option<f64> {
     readings.iter().map(share).filter(|share| share.is_finite()).reduce(f64::max)
 }
 
-/// Beads all over a part of the picture, as far as they are seen on the bed and on
-/// the highest surface.
-pub fn readings(covariance: &Covariance, part: [ImagePoint; 2]) -> Vec<Reading> {
+fn readings(covariance: &Covariance) -> Vec<Reading> {
+    let beads = beads_where_seen(covariance).into_iter();
+    beads.filter_map(|(ends, height)| covariance.width(ends, height)).collect()
+}
+
+/// Ends of beads all over the part of the picture where boards were seen, on the bed and
+/// on the highest surface.
+pub fn beads_where_seen(covariance: &Covariance) -> Vec<([ImagePoint; 2], Mm)> {
     let above = Mm::new(SURFACE * covariance.camera_height_mm()).unwrap_or(Mm::ZERO);
-    let beads = [Mm::ZERO, above]
-        .into_iter()
-        .flat_map(|height| beads(part).map(move |ends| (height, ends)));
-    beads.filter_map(|(height, ends)| covariance.width(ends, height)).collect()
+    let on = |height| beads(covariance.seen_px()).map(move |ends| (ends, height));
+    [Mm::ZERO, above].into_iter().flat_map(on).collect()
 }
 
 /// Ends of the beads for which the share is told, all of them within a part of

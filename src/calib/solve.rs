@@ -159,7 +159,8 @@ pub(super) struct Views {
     pub boards: Vec<Vec<Vec<Corner>>>,
     /// A camera and places that are roughly right.
     pub start: (Model, Vec<Place>),
-    size: [u32; 2],
+    /// Size of the pictures \[px\].
+    pub size: [u32; 2],
 }
 
 impl Views {

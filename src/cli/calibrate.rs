@@ -1,5 +1,7 @@
 //! `truebead calibrate`: camera and bed plane from pictures of a checkerboard.
 
+mod conclusion;
+mod live;
 mod plane;
 mod report;
 
@@ -7,28 +9,19 @@ use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::Context;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
-use self::plane::Plane;
+use self::conclusion::Conclusion;
 use super::WrongArguments;
 use crate::calib::board::{Board, Marks};
-use crate::calib::covariance::Covariance;
 use crate::calib::dictionary::Dictionary;
-use crate::calib::map::{self, WidthMap};
-use crate::calib::next_view::{self, NextView};
-use crate::calib::quality;
-use crate::calib::share;
 use crate::calib::sighting::{self, Looks, Refusal, Sighting};
-use crate::calib::solve::{self, Solution};
-use crate::calib::{Calibration, Quality, file};
 use crate::frame::Channel;
 use crate::io::camera::folder::list_images;
 use crate::io::image_file;
 use crate::io::whole_file::write_whole;
-use crate::offline::calibration::Page;
 use crate::time::Stamp;
 use crate::units::Mm;
 
@@ -43,10 +36,29 @@ all parts of the picture. Take the last one with the board flat on the bed, or
 name that picture with --plane. calib/README.md tells more.
 
 Besides the calibration file a report.html is written: what a width is known
-to, all over the picture, and what one more picture would bring.")]
+to, all over the picture, and what one more picture would bring.
+
+  truebead calibrate --camera camera:0 --board 9x6 --square-mm 20 \\
+    --bead-mm 40 --max-width-sigma-mm 0.05 --out calib.toml
+
+takes the pictures, too: first of the board lying on the bed, then of every
+place in which it is held, and ends when the width of the bead is known as well
+as was asked for.")]
 pub struct CalibrateArgs {
     /// Folder of checkerboard images
-    input: PathBuf,
+    #[arg(required_unless_present = "camera", conflicts_with = "camera")]
+    input: Option<PathBuf>,
+    /// Take the pictures now, with this camera, as a cell names it: camera:0,
+    /// gst:<pipeline>, an http address, or recorded frames
+    #[arg(long, value_name = "SOURCE")]
+    camera: Option<String>,
+    /// Folder for the pictures that are taken
+    /// [default: beside the calibration file, with its name and -pictures]
+    #[arg(long, value_name = "DIR", requires = "camera")]
+    pictures: Option<PathBuf>,
+    /// Pictures a second from an http address or from recorded frames
+    #[arg(long, value_name = "HZ", requires = "camera", default_value_t = 10.0)]
+    rate_hz: f64,
     #[command(flatten)]
     board: BoardArgs,
     /// Calibration file to write
@@ -55,7 +67,7 @@ pub struct CalibrateArgs {
     /// Image whose board lies on the bed: one of the folder's, or any other file; give
     /// it again for further boards on the bed
     /// [default: the last image in which the board is found]
-    #[arg(long, value_name = "IMAGE")]
+    #[arg(long, value_name = "IMAGE", conflicts_with = "camera")]
     plane: Vec<PathBuf>,
     /// Height of the board's printed face above the bed [mm]
     #[arg(long, value_name = "MM", default_value = "0", value_parser = parse_length)]
@@ -151,119 +163,44 @@ const LONGEST_MM: f64 = 1e5;
 /// Sides of squares \[mm\].
 const SQUARES_MM: (f64, f64) = (0.01, 1e4);
 
+/// Pictures that were looked at.
+struct Pictures {
+    files: Vec<PathBuf>,
+    looks: Looks,
+    /// Those whose boards lay on the bed; none where the last one is to be taken.
+    on_bed: Vec<PathBuf>,
+}
+
 /// Runs the command; the table and the figures go to standard output. Fails
 /// without writing anything where no calibration can be found.
 pub fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     let board = args.board.board()?;
     check_lengths(args)?;
-    let files = list_images(&args.input)
-        .map_err(|error| WrongArguments::new(format!("{}: {}", error.source_name, error.what)))?;
-    plane::check(&args.plane, &files)?;
-    let mut looks = look_at_all(&board, &files);
-    sighting::agree_on_size(&mut looks);
-    sighting::take_out_duplicates(&board, &mut looks);
-    let seen: Vec<Sighting> = looks.iter().filter_map(|(_, look)| look.clone().ok()).collect();
-    let solution = solve::solve(&board, &seen).inspect_err(|_| say(&report::refusals(&looks)))?;
-    say(&report::images(&looks, &solution));
-    let plane = plane::find(args, &board, &solution, (&files, &looks))?;
-    let findings = Findings::of(args, &board, &solution, &plane)?;
-    let calibration = write(args, &board, &solution, &plane, &findings)?;
-    let answer = text_of(args, &solution, &plane, &calibration, &findings);
+    let pictures = match &args.input {
+        Some(folder) => look_into(args, &board, folder)?,
+        None => live::take(args, &board)?,
+    };
+    let conclusion = Conclusion::of(args, &board, &pictures)
+        .inspect_err(|_| say(&report::refusals(&pictures.looks)))?;
+    say(&report::images(&pictures.looks, &conclusion.solution));
+    let calibration = conclusion.write()?;
+    let answer = conclusion.text(&calibration);
     say(&answer);
     say(&format!("\nwrote {}\n", args.out.display()));
-    let page = Page {
-        board: &board,
-        looks: &looks,
-        solution: &solution,
-        maps: &findings.maps,
-        limit_mm: args.max_width_sigma_mm.map(Mm::get),
-        next: findings.next.as_ref(),
-        text: &answer,
-        calibration_file: &args.out.display().to_string(),
-    }
-    .page();
     let report = args.report();
-    write_whole(&report, page.as_bytes())?;
+    write_whole(&report, conclusion.page(&answer, None).as_bytes())?;
     say(&format!("wrote {}\n", report.display()));
-    Ok(if findings.fails(args.max_width_sigma_mm) { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    Ok(if conclusion.fails() { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
-/// What the calibration leaves open.
-struct Findings {
-    covariance: Option<Covariance>,
-    maps: Vec<WidthMap>,
-    next: Option<NextView>,
-}
-
-impl Findings {
-    /// Fails for a surface that the camera does not look down on.
-    fn of(
-        args: &CalibrateArgs,
-        board: &Board,
-        solution: &Solution,
-        plane: &Plane,
-    ) -> anyhow::Result<Self> {
-        // Corners' noise is the least of the errors where the focal length is loose.
-        let covariance = quality::settles_camera(solution)
-            .then(|| Covariance::of(board, solution, &plane.on_bed, plane.thickness))
-            .flatten();
-        let Some(known) = &covariance else {
-            return Ok(Self { covariance, maps: Vec::new(), next: None });
-        };
-        let camera_mm = known.camera_height_mm();
-        if let Some(height) = args.surface_height_mm.iter().find(|h| h.get() >= camera_mm) {
-            anyhow::bail!(
-                "--surface-height-mm: found {height}, but the camera is only {camera_mm:.1} mm above \
-                 the bed"
-            );
-        }
-        let above = Mm::new((known.camera_height_mm() / 20.0).round()).unwrap_or(Mm::ZERO);
-        let usual = [Mm::ZERO, above];
-        let told = args.surface_height_mm.as_slice();
-        let heights = if told.is_empty() { &usual[..] } else { told };
-        let bead = args.bead_mm.map(Mm::get).or_else(|| map::usual_bead_mm(known));
-        let maps = bead.map_or_else(Vec::new, |bead| {
-            heights.iter().map(|&height| WidthMap::of(known, bead, height)).collect()
-        });
-        let next = next_view::best(board, solution, known);
-        Ok(Self { covariance, maps, next })
-    }
-
-    /// Share of a width that the calibration leaves open where boards were seen: of the
-    /// bead that was told or is usual, at the worst of the heights.
-    fn share(&self) -> Option<f64> {
-        let shares = self.maps.iter().map(|map| Some(map.worst_where_seen_mm? / map.bead_mm));
-        let told = shares.reduce(|a, b| Some(a?.max(b?))).flatten();
-        told.or_else(|| share::where_seen(self.covariance.as_ref()?))
-    }
-
-    /// Whether a width is known less well than it must be.
-    fn fails(&self, limit: Option<Mm>) -> bool {
-        let worst = self.maps.iter().map(|map| map.worst_where_seen_mm);
-        let worst = worst.reduce(|a, b| Some(a?.max(b?))).flatten();
-        limit.is_some_and(|limit| worst.is_none_or(|worst| worst > limit.get()))
-    }
-}
-
-fn text_of(
-    args: &CalibrateArgs,
-    solution: &Solution,
-    plane: &Plane,
-    calibration: &Calibration,
-    findings: &Findings,
-) -> String {
-    let covariance = findings.covariance.as_ref();
-    [
-        report::lens(solution),
-        report::camera(solution),
-        report::plane(plane),
-        report::width(calibration, covariance, &findings.maps),
-        report::maps(&findings.maps, args.max_width_sigma_mm),
-        report::next_view(covariance, findings.next.as_ref()),
-        report::scale(calibration, covariance, plane.thickness),
-        report::doubts(solution),
-    ]
-    .concat()
+fn look_into(args: &CalibrateArgs, board: &Board, folder: &Path) -> anyhow::Result<Pictures> {
+    let files = list_images(folder)
+        .map_err(|error| WrongArguments::new(format!("{}: {}", error.source_name, error.what)))?;
+    plane::check(&args.plane, &files)?;
+    let mut looks = look_at_all(board, &files);
+    sighting::agree_on_size(&mut looks);
+    sighting::take_out_duplicates(board, &mut looks);
+    Ok(Pictures { files, looks, on_bed: args.plane.clone() })
 }
 
 impl CalibrateArgs {
@@ -292,6 +229,10 @@ fn check_lengths(args: &CalibrateArgs) -> Result<(), WrongArguments> {
     if args.board_thickness_mm < Mm::ZERO {
         return Err(WrongArguments::new("the board's thickness cannot be below 0 mm"));
     }
+    if !(0.1..=1000.0).contains(&args.rate_hz) {
+        let what = format!("--rate-hz: found {}, expected 0.1 to 1000", args.rate_hz);
+        return Err(WrongArguments::new(what));
+    }
     for (name, value) in
         [("bead-mm", args.bead_mm), ("max-width-sigma-mm", args.max_width_sigma_mm)]
     {
@@ -315,7 +256,7 @@ fn look_at_all(board: &Board, files: &[PathBuf]) -> Looks {
     let looks = files
         .par_iter()
         .map(|path| {
-            let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+            let name = conclusion::name_of(path);
             let look = look_at(board, &name, path);
             bar.inc(1);
             (name, look)
@@ -341,44 +282,4 @@ fn progress(count: usize) -> ProgressBar {
     let bar = ProgressBar::new(count as u64);
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar
-}
-
-/// Writes the file, once it has been read back and found sound.
-fn write(
-    args: &CalibrateArgs,
-    board: &Board,
-    solution: &Solution,
-    plane: &Plane,
-    findings: &Findings,
-) -> anyhow::Result<Calibration> {
-    let (columns, rows) = board.corners();
-    let note = format!(
-        "From {} images of a board with {columns}x{rows} inner corners and squares of {}.\n\
-         Bed plane: {} below the board's face in {}.",
-        solution.views.len(),
-        board.square(),
-        plane.thickness,
-        plane.images.join(", "),
-    );
-    let covariance = findings.covariance.as_ref();
-    let quality = Quality {
-        reprojection_rms_px: solution.rms_px,
-        width_sigma_share: findings.share(),
-        seen_px: covariance.map(|covariance| {
-            let [from, to] = covariance.seen_px();
-            [from.x, from.y, to.x, to.y].map(|px| (px * 10.0).round() / 10.0)
-        }),
-        heights_mm: None,
-    };
-    let bed = plane.on_bed.bed(plane.thickness);
-    let heights_mm = covariance.and_then(|_| solution.heights_mm(board, &bed));
-    let quality = Quality { heights_mm, ..quality };
-    let model = (solution.camera(), &bed);
-    let (size, robot_z) = (solution.image_size_px, plane.robot_z);
-    let text = file::to_toml(model, size, robot_z, Some(quality), &[note]);
-    let name = args.out.display().to_string();
-    let calibration = file::parse(&name, &text)
-        .context("the solution is not a camera that can measure; nothing was written")?;
-    write_whole(&args.out, text.as_bytes())?;
-    Ok(calibration)
 }

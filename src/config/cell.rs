@@ -102,6 +102,24 @@ pub enum Source {
     Rendered,
 }
 
+impl Source {
+    /// The source that a name means; paths are relative to a folder. `None` for a camera
+    /// without a whole number.
+    pub fn parse(name: &str, folder: &Path) -> Option<Self> {
+        if name == "rendered" {
+            Some(Self::Rendered)
+        } else if let Some(index) = name.strip_prefix("camera:") {
+            index.trim().parse().ok().filter(|index| *index >= 0).map(Self::Index)
+        } else if let Some(pipeline) = name.strip_prefix("gst:") {
+            Some(Self::Pipeline(pipeline.trim().to_string()))
+        } else if name.starts_with("http://") || name.starts_with("https://") {
+            Some(Self::Url(name.to_string()))
+        } else {
+            Some(Self::Path(folder.join(name)))
+        }
+    }
+}
+
 /// How a camera rides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mount {
@@ -332,7 +350,7 @@ fn read_camera(
 ) -> Option<Camera> {
     let name = table.text("source");
     let source = name.and_then(|name| {
-        let source = parse_source(name, folder);
+        let source = Source::parse(name, folder);
         if source.is_none() {
             table.report("source", format!("\"{name}\""), "camera: and a whole number");
         }
@@ -348,20 +366,6 @@ fn read_camera(
         offset: Mm::new(offset?).ok()?,
         deadline: Span::from_secs(deadline?),
     })
-}
-
-fn parse_source(name: &str, folder: &Path) -> Option<Source> {
-    if name == "rendered" {
-        Some(Source::Rendered)
-    } else if let Some(index) = name.strip_prefix("camera:") {
-        index.trim().parse().ok().filter(|index| *index >= 0).map(Source::Index)
-    } else if let Some(pipeline) = name.strip_prefix("gst:") {
-        Some(Source::Pipeline(pipeline.trim().to_string()))
-    } else if name.starts_with("http://") || name.starts_with("https://") {
-        Some(Source::Url(name.to_string()))
-    } else {
-        Some(Source::Path(folder.join(name)))
-    }
 }
 
 fn read_robot(table: &Table<'_>, limits: Option<Limits>) -> Option<Robot> {

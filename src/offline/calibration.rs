@@ -6,7 +6,7 @@ mod drawing;
 use maud::{Markup, html};
 
 use self::drawing::{Drawing, residuals, width_map};
-use super::report::whole_page;
+use super::report::reloading_page;
 use crate::calib::board::Board;
 use crate::calib::map::WidthMap;
 use crate::calib::next_view::NextView;
@@ -33,6 +33,8 @@ pub struct Page<'a> {
     pub text: &'a str,
     /// The calibration file.
     pub calibration_file: &'a str,
+    /// Seconds after which the page loads itself anew, while pictures are still taken.
+    pub reload_s: Option<u32>,
 }
 
 impl Page<'_> {
@@ -49,7 +51,7 @@ impl Page<'_> {
             section { h2 { "The answer as text" } pre.wide { (self.text) } }
             footer { "Written by truebead " (env!("CARGO_PKG_VERSION")) "." }
         };
-        whole_page(&title, &body).into_string()
+        reloading_page(&title, self.reload_s, &body).into_string()
     }
 
     fn about(&self) -> Markup {

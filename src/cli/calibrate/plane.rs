@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-use super::{CalibrateArgs, WrongArguments, look_at};
+use super::{CalibrateArgs, Pictures, WrongArguments, look_at};
 use crate::calib::board::{Board, Seen};
 use crate::calib::equations::Corner;
 use crate::calib::plane::OnBed;
@@ -65,16 +65,17 @@ pub fn find(
     args: &CalibrateArgs,
     board: &Board,
     solution: &Solution,
-    (files, looks): (&[PathBuf], &Looks),
+    pictures: &Pictures,
 ) -> anyhow::Result<Plane> {
+    let Pictures { files, looks, on_bed: named } = pictures;
     let mut found: Vec<(String, Vec<Seen>)> = Vec::new();
     let mut passed_over = Vec::new();
-    if args.plane.is_empty() {
+    if named.is_empty() {
         let (last, later) = last_seen(solution, looks).context("no picture shows the board")?;
         found.push((last.to_owned(), corners_of(solution, last).unwrap_or_default()));
         passed_over = later;
     }
-    for path in &args.plane {
+    for path in named {
         let (image, corners) = on_bed(path, board, solution, (files, looks))?;
         let is_twin = |(_, other): &&(String, Vec<Seen>)| is_same_place(board, other, &corners);
         if let Some((twin, _)) = found.iter().find(is_twin) {
@@ -110,7 +111,7 @@ pub fn find(
     }
     Ok(Plane {
         images,
-        assumed: args.plane.is_empty(),
+        assumed: named.is_empty(),
         passed_over,
         on_bed,
         thickness: args.board_thickness_mm,

@@ -79,8 +79,14 @@ pub fn lens(solution: &Solution) -> String {
         let name = trial.free.lens.map_or("", |lens| lens.name());
         let bend = if trial.free.bend { ", bent board" } else { "" };
         let held_out = trial.held_out_px.map_or_else(|| "-".to_owned(), |px| format!("{px:.4}"));
+        let folds = if trial.folds { "  turns over within the picture" } else { "" };
         let mark = if trial.free == solution.free { "  <- taken" } else { "" };
-        line!(out, "  {:28}  {:.4}  {held_out:>11}{mark}", format!("{name}{bend}"), trial.rms_px);
+        line!(
+            out,
+            "  {:28}  {:.4}  {held_out:>11}{folds}{mark}",
+            format!("{name}{bend}"),
+            trial.rms_px
+        );
     }
     out
 }

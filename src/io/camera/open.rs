@@ -68,19 +68,47 @@ pub fn is_mcap(path: &Path) -> bool {
     ends(path, "mcap") || (ends(path, "partial") && ends(&path.with_extension(""), "mcap"))
 }
 
-/// Opens the camera of a cell, but for the rendered one. Recorded frames are
-/// given out at the camera's rate, as if they were live; `stop` ends them.
+/// A source that is to give frames as they come.
+#[derive(Debug, Clone, Copy)]
+pub struct LiveOptions<'a> {
+    /// Where frames come from.
+    pub source: &'a Source,
+    /// The source as the user names it.
+    pub name: &'a str,
+    /// Frames a second of sources that do not set their own pace.
+    pub rate_hz: f64,
+    /// Longest wait for a frame before the camera counts as lost.
+    pub deadline: Span,
+    /// Which part of a colour image.
+    pub channel: Channel,
+}
+
+impl<'a> LiveOptions<'a> {
+    /// Of a cell's camera.
+    pub fn of(camera: &'a Camera, channel: Channel) -> Self {
+        Self {
+            source: &camera.source,
+            name: &camera.source_name,
+            rate_hz: camera.rate_hz,
+            deadline: camera.deadline,
+            channel,
+        }
+    }
+}
+
+/// Opens a camera, but for the rendered one. Recorded frames are given out at the
+/// camera's rate, as if they were live; `stop` ends them.
 pub fn live(
-    camera: &Camera,
-    channel: Channel,
+    camera: LiveOptions<'_>,
     clock: RunClock,
     stop: Receiver<()>,
 ) -> Result<Box<dyn FrameSource>, SourceError> {
+    let channel = camera.channel;
     let patience = Patience { deadline: camera.deadline, attempts: ATTEMPTS };
     let device = |input| -> Result<Box<dyn FrameSource>, SourceError> {
-        Ok(Box::new(Live::open(input, &camera.source_name, channel, patience, clock)?))
+        Ok(Box::new(Live::open(input, camera.name, channel, patience, clock)?))
     };
-    match &camera.source {
+    match camera.source {
         Source::Index(index) => device(VideoInput::Camera(*index)),
         Source::Pipeline(pipeline) => device(VideoInput::Pipeline(pipeline.clone())),
         Source::Url(url) => {
@@ -97,9 +125,7 @@ pub fn live(
             let period = Span::from_secs(1.0 / camera.rate_hz);
             Ok(Box::new(Paced { inner, clock, period, due: None, stop }))
         }
-        Source::Rendered => {
-            Err(fault(&camera.source_name, "the rendered camera is opened with its bead"))
-        }
+        Source::Rendered => Err(fault(camera.name, "the rendered camera is opened with its bead")),
     }
 }
 

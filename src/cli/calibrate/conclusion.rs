@@ -1,0 +1,198 @@
+//! What the pictures of a board lead to: camera, bed plane, and what they leave open.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+
+use super::plane::{self, Plane};
+use super::{CalibrateArgs, Pictures, report};
+use crate::calib::board::Board;
+use crate::calib::covariance::Covariance;
+use crate::calib::map::{self, WidthMap};
+use crate::calib::next_view::{self, NextView};
+use crate::calib::quality;
+use crate::calib::share;
+use crate::calib::sighting::Sighting;
+use crate::calib::solve::{self, Solution};
+use crate::calib::{Calibration, Quality, file};
+use crate::io::whole_file::write_whole;
+use crate::offline::calibration::Page;
+use crate::units::Mm;
+
+/// A camera that was found, and how well.
+pub struct Conclusion<'a> {
+    args: &'a CalibrateArgs,
+    board: &'a Board,
+    pictures: &'a Pictures,
+    /// The camera.
+    pub solution: Solution,
+    plane: Plane,
+    covariance: Option<Covariance>,
+    maps: Vec<WidthMap>,
+    /// What one more picture would bring.
+    pub next: Option<NextView>,
+}
+
+impl<'a> Conclusion<'a> {
+    /// Fails where no camera or no bed is found, and for a surface that the camera does
+    /// not look down on.
+    pub fn of(
+        args: &'a CalibrateArgs,
+        board: &'a Board,
+        pictures: &'a Pictures,
+    ) -> anyhow::Result<Self> {
+        let looks = pictures.looks.iter();
+        let seen: Vec<Sighting> = looks.filter_map(|(_, look)| look.clone().ok()).collect();
+        let solution = solve::solve(board, &seen)?;
+        let plane = plane::find(args, board, &solution, pictures)?;
+        // Corners' noise is the least of the errors where the focal length is loose.
+        let covariance = quality::settles_camera(&solution)
+            .then(|| Covariance::of(board, &solution, &plane.on_bed, plane.thickness))
+            .flatten();
+        let mut conclusion = Self {
+            args,
+            board,
+            pictures,
+            solution,
+            plane,
+            covariance,
+            maps: Vec::new(),
+            next: None,
+        };
+        conclusion.tell_widths()?;
+        Ok(conclusion)
+    }
+
+    /// Works out what is left open in the width of the bead.
+    fn tell_widths(&mut self) -> anyhow::Result<()> {
+        let Some(known) = &self.covariance else { return Ok(()) };
+        let camera_mm = known.camera_height_mm();
+        let told = self.args.surface_height_mm.as_slice();
+        if let Some(height) = told.iter().find(|height| height.get() >= camera_mm) {
+            anyhow::bail!(
+                "--surface-height-mm: found {height}, but the camera is only {camera_mm:.1} mm above \
+                 the bed"
+            );
+        }
+        let usual = [Mm::ZERO, Mm::new((camera_mm / 20.0).round()).unwrap_or(Mm::ZERO)];
+        let heights = if told.is_empty() { &usual[..] } else { told };
+        let Some(bead) = self.args.bead_mm.map(Mm::get).or_else(|| map::usual_bead_mm(known))
+        else {
+            return Ok(());
+        };
+        self.maps = heights.iter().map(|&height| WidthMap::of(known, bead, height)).collect();
+        self.next = next_view::best(self.board, &self.solution, known, (bead, heights));
+        Ok(())
+    }
+
+    /// The largest standard deviation of the bead's width where boards were seen \[mm\], at
+    /// any of the heights; `None` where that cannot be told.
+    pub fn worst_mm(&self) -> Option<f64> {
+        let worst = self.maps.iter().map(|map| map.worst_where_seen_mm);
+        worst.reduce(|a, b| Some(a?.max(b?))).flatten()
+    }
+
+    /// Whether a width is known less well than it must be.
+    pub fn fails(&self) -> bool {
+        let limit = self.args.max_width_sigma_mm;
+        limit.is_some_and(|limit| self.worst_mm().is_none_or(|worst| worst > limit.get()))
+    }
+
+    /// Share of a width that the calibration leaves open where boards were seen: of the
+    /// bead that was told or is usual, at the worst of the heights.
+    fn share(&self) -> Option<f64> {
+        let bead = self.maps.first().map(|map| map.bead_mm);
+        let told = self.worst_mm().zip(bead).map(|(worst, bead)| worst / bead);
+        told.or_else(|| share::where_seen(self.covariance.as_ref()?))
+    }
+
+    /// The answer, but for the list of pictures.
+    pub fn text(&self, calibration: &Calibration) -> String {
+        let covariance = self.covariance.as_ref();
+        [
+            report::lens(&self.solution),
+            report::camera(&self.solution),
+            report::plane(&self.plane),
+            report::width(calibration, covariance, &self.maps),
+            report::maps(&self.maps, self.args.max_width_sigma_mm),
+            report::next_view(covariance, self.next.as_ref()),
+            report::scale(calibration, covariance, self.plane.thickness),
+            report::doubts(&self.solution),
+        ]
+        .concat()
+    }
+
+    /// The report; with a number of seconds after which it loads itself anew.
+    pub fn page(&self, text: &str, reload_s: Option<u32>) -> String {
+        Page {
+            board: self.board,
+            looks: &self.pictures.looks,
+            solution: &self.solution,
+            maps: &self.maps,
+            limit_mm: self.args.max_width_sigma_mm.map(Mm::get),
+            next: self.next.as_ref(),
+            text,
+            calibration_file: &self.args.out.display().to_string(),
+            reload_s,
+        }
+        .page()
+    }
+
+    /// Writes the file, once it has been read back and found sound.
+    pub fn write(&self) -> anyhow::Result<Calibration> {
+        let text = self.file();
+        let calibration = self.read_back(&text)?;
+        write_whole(&self.args.out, text.as_bytes())?;
+        Ok(calibration)
+    }
+
+    /// The calibration as it would be read from the file.
+    pub fn calibration(&self) -> anyhow::Result<Calibration> {
+        self.read_back(&self.file())
+    }
+
+    fn read_back(&self, text: &str) -> anyhow::Result<Calibration> {
+        file::parse(&self.args.out.display().to_string(), text)
+            .context("the solution is not a camera that can measure; nothing was written")
+    }
+
+    /// The text of the calibration file.
+    fn file(&self) -> String {
+        let (solution, plane) = (&self.solution, &self.plane);
+        let (columns, rows) = self.board.corners();
+        let kind = if self.board.is_plain() { "board" } else { "ChArUco board" };
+        let note = format!(
+            "From {} images of a {kind} with {columns}x{rows} inner corners and squares of {}.\n\
+             Bed plane: {} below the board's face in {}.",
+            solution.views.len(),
+            self.board.square(),
+            plane.thickness,
+            plane.images.join(", "),
+        );
+        let bed = plane.on_bed.bed(plane.thickness);
+        let covariance = self.covariance.as_ref();
+        let quality = Quality {
+            reprojection_rms_px: solution.rms_px,
+            width_sigma_share: self.share(),
+            seen_px: covariance.map(|covariance| {
+                let [from, to] = covariance.seen_px();
+                [from.x, from.y, to.x, to.y].map(|px| (px * 10.0).round() / 10.0)
+            }),
+            heights_mm: covariance.and_then(|_| solution.heights_mm(self.board, &bed)),
+        };
+        let model = (solution.camera(), &bed);
+        file::to_toml(model, solution.image_size_px, plane.robot_z, Some(quality), &[note])
+    }
+}
+
+/// Names of files, without their folders.
+pub fn name_of(path: &std::path::Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// Pictures that a camera has taken so far, the first with the board on the bed.
+pub fn taken(files: &[PathBuf], kept: &[Sighting]) -> Pictures {
+    let looks = kept.iter().map(|sighting| (sighting.name.clone(), Ok(sighting.clone())));
+    let on_bed = files.first().cloned().into_iter().collect();
+    Pictures { files: files.to_vec(), looks: looks.collect(), on_bed }
+}

@@ -1,0 +1,304 @@
+//! Pictures for a calibration, taken while the board is held before the camera.
+
+use std::fmt::Write as _;
+use std::io::{IsTerminal, Write as _};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::conclusion::{Conclusion, taken};
+use super::{CalibrateArgs, Pictures, WrongArguments};
+use crate::calib::board::Board;
+use crate::calib::collect::{Collector, News};
+use crate::calib::coverage::{CELLS, Coverage, SIDES};
+use crate::calib::quality;
+use crate::calib::sighting;
+use crate::calib::solve::FEWEST_VIEWS;
+use crate::config::cell::Source;
+use crate::frame::{Channel, Frame};
+use crate::io::camera::open::{self, LiveOptions};
+use crate::io::clock::RunClock;
+use crate::io::image_file;
+use crate::io::stop::StopSignal;
+use crate::io::whole_file::write_whole;
+use crate::ports::{FrameSource, Grab};
+use crate::time::Span;
+
+/// Longest wait for a picture \[s\].
+const DEADLINE_S: f64 = 5.0;
+/// More pictures than this say nothing more that is worth the while.
+const MOST_VIEWS: usize = 60;
+/// Seconds after which the report loads itself anew.
+const RELOAD_S: u32 = 3;
+
+/// Takes pictures until the width of the bead is known as well as was asked for, a
+/// further picture brings nothing, the camera ends, or the user ends it.
+pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<Pictures> {
+    let name = args.camera.as_deref().unwrap_or_default();
+    let source = source(name)?;
+    let folder = folder(args)?;
+    let stop = StopSignal::install().context("cannot listen for signals")?;
+    let options = LiveOptions {
+        source: &source,
+        name,
+        rate_hz: args.rate_hz,
+        deadline: Span::from_secs(DEADLINE_S),
+        channel: Channel::Grey,
+    };
+    let mut camera = open::live(options, RunClock::start(), stop.told().clone())?;
+    std::fs::create_dir_all(&folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let mut taking = Taking::new(args, board, folder);
+    taking.run(camera.as_mut(), &stop)?;
+    taking.finish()
+}
+
+fn source(name: &str) -> Result<Source, WrongArguments> {
+    match Source::parse(name, Path::new("")) {
+        None => Err(WrongArguments::new(format!(
+            "--camera {name}: expected camera: and a whole number, such as camera:0"
+        ))),
+        Some(Source::Rendered) => Err(WrongArguments::new(
+            "--camera rendered: the rendered camera shows a bead, not a board; name a real one",
+        )),
+        Some(source) => Ok(source),
+    }
+}
+
+/// A folder without other pictures in it: these would be taken for some of this camera.
+fn folder(args: &CalibrateArgs) -> Result<PathBuf, WrongArguments> {
+    let beside = || {
+        let stem = args.out.file_stem().unwrap_or(args.out.as_os_str()).to_string_lossy();
+        args.out.with_file_name(format!("{stem}-pictures"))
+    };
+    let folder = args.pictures.clone().unwrap_or_else(beside);
+    let is_empty = match std::fs::read_dir(&folder) {
+        Ok(mut entries) => entries.next().is_none(),
+        Err(_) => !folder.exists(),
+    };
+    if is_empty {
+        return Ok(folder);
+    }
+    Err(WrongArguments::new(format!(
+        "{}: expected an empty folder, or none; name another with --pictures, or calibrate from \
+         the pictures in it with `truebead calibrate {}`",
+        folder.display(),
+        folder.display()
+    )))
+}
+
+/// What has been taken, and what is said about it.
+struct Taking<'a> {
+    args: &'a CalibrateArgs,
+    board: &'a Board,
+    folder: PathBuf,
+    collector: Collector,
+    files: Vec<PathBuf>,
+    screen: Screen,
+}
+
+impl<'a> Taking<'a> {
+    fn new(args: &'a CalibrateArgs, board: &'a Board, folder: PathBuf) -> Self {
+        let collector = Collector::new(*board);
+        Self { args, board, folder, collector, files: Vec::new(), screen: Screen::new() }
+    }
+
+    fn run(&mut self, camera: &mut dyn FrameSource, stop: &StopSignal) -> anyhow::Result<()> {
+        self.screen
+            .say("lay the board flat on the bed, in the middle of the picture, and let it lie");
+        while !stop.asked() {
+            let is_enough = match camera.next_frame() {
+                Ok(Some(Grab::Frame { frame, .. })) => self.look(&frame)?,
+                Ok(Some(Grab::Unreadable { reason, .. })) => {
+                    self.screen.state(&format!("unreadable: {reason}"));
+                    false
+                }
+                Ok(None) => break,
+                Err(error) if self.files.is_empty() => return Err(error.into()),
+                Err(error) => {
+                    self.screen.say(&format!("{error}; ending with the pictures so far"));
+                    break;
+                }
+            };
+            if is_enough {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the pictures are enough.
+    fn look(&mut self, frame: &Frame) -> anyhow::Result<bool> {
+        match self.collector.see(sighting::look(self.board, "", frame)) {
+            News::Kept(number) => self.keep(number, frame),
+            news => {
+                self.screen.state(&words(&news));
+                Ok(false)
+            }
+        }
+    }
+
+    fn keep(&mut self, number: usize, frame: &Frame) -> anyhow::Result<bool> {
+        let name = format!("view-{number:03}.png");
+        let path = self.folder.join(&name);
+        let png = image_file::encode_png(frame)?;
+        write_whole(&path, &png).with_context(|| {
+            format!("the {} pictures before it are in {}", number - 1, self.folder.display())
+        })?;
+        self.collector.name_last(&name);
+        self.files.push(path);
+        let corners = self.collector.kept().last().map_or(0, |kept| kept.corners.len());
+        let what = if number == 1 { "the bed plane, " } else { "" };
+        self.screen.ring();
+        self.screen.say(&format!("view {number}: {what}{corners} corners -> {name}"));
+        if number == 1 {
+            self.screen.say(
+                "take the board up; hold it still for a moment in every part of the picture, tilted \
+                 by 20 to 45 degrees to all sides",
+            );
+        }
+        if number < FEWEST_VIEWS {
+            return Ok(false);
+        }
+        Ok(self.judge(number) || number >= MOST_VIEWS)
+    }
+
+    /// Says how far the pictures have come, and writes the report; whether they are
+    /// enough. While there are few they may make no camera; then more are taken.
+    fn judge(&mut self, number: usize) -> bool {
+        let pictures = taken(&self.files, self.collector.kept());
+        let conclusion = match Conclusion::of(self.args, self.board, &pictures) {
+            Ok(conclusion) => conclusion,
+            Err(error) => {
+                self.screen.say(&format!("  not yet a calibration: {error:#}"));
+                return false;
+            }
+        };
+        self.screen.say(&progress(self.args, &conclusion));
+        let page =
+            conclusion.calibration().map(|c| conclusion.page(&conclusion.text(&c), Some(RELOAD_S)));
+        let report = self.args.report();
+        match page.map(|page| write_whole(&report, page.as_bytes())) {
+            Ok(Ok(())) if number == FEWEST_VIEWS => {
+                self.screen.say(&format!("  open {} to follow it", report.display()));
+            }
+            Ok(Ok(())) | Err(_) => {}
+            // It is written once more at the end, and fails there if it must.
+            Ok(Err(error)) => self.screen.state(&error.to_string()),
+        }
+        is_enough(self.args, &conclusion)
+    }
+
+    fn finish(self) -> anyhow::Result<Pictures> {
+        self.screen.end();
+        if self.files.is_empty() {
+            // Nothing was put into it.
+            let _ = std::fs::remove_dir(&self.folder);
+            bail!("the camera has not shown the board lying still on the bed; nothing was written");
+        }
+        let pictures = taken(&self.files, self.collector.kept());
+        println!("{} pictures in {}\n", self.files.len(), self.folder.display());
+        Ok(pictures)
+    }
+}
+
+/// Whether nothing speaks against the calibration, and widths are known as well as was
+/// asked for, or as well as one more picture would let them be known.
+fn is_enough(args: &CalibrateArgs, conclusion: &Conclusion<'_>) -> bool {
+    let known = match args.max_width_sigma_mm {
+        Some(_) => !conclusion.fails(),
+        None => conclusion.worst_mm().is_some() && conclusion.next.is_none(),
+    };
+    known && quality::doubts(&conclusion.solution).is_empty()
+}
+
+/// How far the pictures have come.
+fn progress(args: &CalibrateArgs, conclusion: &Conclusion<'_>) -> String {
+    let coverage = Coverage::of(&conclusion.solution);
+    let mut text = String::new();
+    let width = conclusion.worst_mm().map_or_else(
+        || "how well a width is known cannot be told yet".to_owned(),
+        |worst| format!("a width is known to {worst:.4} mm"),
+    );
+    let asked = args.max_width_sigma_mm;
+    let asked = asked.map_or_else(String::new, |limit| format!(" ({} mm asked for)", limit.get()));
+    let _ = writeln!(text, "  {width}{asked}");
+    let tilts = SIDES.iter().zip(coverage.tilts).map(|(side, count)| format!("{side} {count}"));
+    let missing = coverage.missing_tilts();
+    let missing = if missing.is_empty() {
+        String::new()
+    } else {
+        format!("; missing: {}", missing.join(", "))
+    };
+    let beside = [
+        format!("boards in {} of {CELLS} parts of the picture", coverage.count()),
+        format!("side that was nearer: {}{missing}", tilts.collect::<Vec<_>>().join(", ")),
+        conclusion
+            .next
+            .as_ref()
+            .map_or_else(String::new, |next| format!("would help most: {next}")),
+        quality::doubts(&conclusion.solution).first().map_or_else(String::new, ToString::to_string),
+    ];
+    for (row, beside) in coverage.cells.iter().zip(beside) {
+        let row: String = row.iter().map(|&seen| if seen { '#' } else { '.' }).collect();
+        let _ = writeln!(text, "{}", format!("  {row}  {beside}").trim_end());
+    }
+    text.trim_end().to_owned()
+}
+
+fn words(news: &News) -> String {
+    match news {
+        News::Kept(number) => format!("view {number}"),
+        News::Moving => "the board moves: hold it still".to_owned(),
+        News::Waiting => "still: a moment".to_owned(),
+        News::Known(number) => format!("the board is where it was in view {number}: move it"),
+        News::OtherSize => "the camera's pictures have changed their size".to_owned(),
+        News::Refused(refusal) => refusal.to_string(),
+    }
+}
+
+/// Results on standard output; what is just going on on standard error: in one line on a
+/// terminal, otherwise whenever something else is going on.
+struct Screen {
+    bar: ProgressBar,
+    is_plain: bool,
+    last: String,
+}
+
+impl Screen {
+    fn new() -> Self {
+        // Hidden by itself where standard error is not a terminal.
+        let bar = ProgressBar::new_spinner();
+        let style = ProgressStyle::with_template("{spinner} {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        bar.enable_steady_tick(Duration::from_millis(120));
+        Self { bar, is_plain: !std::io::stderr().is_terminal(), last: String::new() }
+    }
+
+    fn say(&self, text: &str) {
+        self.bar.suspend(|| say!("{text}"));
+    }
+
+    fn state(&mut self, text: &str) {
+        self.bar.set_message(text.to_owned());
+        let kind: String = text.chars().filter(|letter| !letter.is_ascii_digit()).collect();
+        if self.is_plain && kind != self.last {
+            // Where standard error is gone there is nobody to tell.
+            let _ = writeln!(std::io::stderr(), "{text}");
+        }
+        self.last = kind;
+    }
+
+    /// Whoever holds the board cannot read the screen.
+    fn ring(&self) {
+        if !self.is_plain {
+            let _ = write!(std::io::stderr(), "\x07");
+        }
+    }
+
+    fn end(&self) {
+        self.bar.finish_and_clear();
+    }
+}
