@@ -127,18 +127,18 @@ impl Bench {
     }
 
     /// Calibrates once, with boards held at random, and measures beads that lie where
-    /// the last board did, on the bed and 5 % of the distance above it. `None` where no
-    /// calibration was found.
+    /// the last board did, on the bed and 5 % of the distance above it. A picture in which
+    /// no board is found is left out, as a user's would be. `None` where that is the one of
+    /// the bed, or where no calibration was found.
     pub fn calibrate(&self, trial: u64) -> Option<Vec<Outcome>> {
         let key = hash::mix(&[self.seed, trial]);
         let poses: Vec<Pose> = (0..self.rig.views)
             .map(|view| self.pose(hash::mix(&[key, view]), view + 1 == self.rig.views))
             .collect::<Option<_>>()?;
-        let sightings: Vec<Sighting> = poses
-            .iter()
-            .zip(0..)
-            .map(|(pose, view)| self.sighting(pose, hash::mix(&[key, view, 1])))
-            .collect::<Option<_>>()?;
+        let (on_bed, held) = poses.split_last()?;
+        let look = |(pose, view)| self.sighting(pose, hash::mix(&[key, view, 1]));
+        let mut sightings: Vec<Sighting> = held.iter().zip(0..).filter_map(look).collect();
+        sightings.push(look((on_bed, self.rig.views - 1))?);
         let board = &self.rig.board;
         let solution = solve::solve(board, &sightings).ok()?;
         let on_bed = OnBed::fit(&solution.model, vec![board.place(&sightings.last()?.corners)])?;
