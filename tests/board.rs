@@ -136,10 +136,14 @@ fn a_printed_board_is_whole_or_not_there() {
 /// A board that is printed is the board that is looked for.
 #[test]
 fn the_board_that_is_kept_is_the_one_that_is_made() {
-    let kept = concat!(env!("CARGO_MANIFEST_DIR"), "/calib/board_9x6_20mm_a4.svg");
     let scratch = tempfile::tempdir().unwrap();
-    let out = scratch.path().join("board.svg");
-    let run = ["board", "--board", "9x6", "--square-mm", "20", "--out"];
-    truebead().args(run).arg(&out).assert().code(0);
-    assert_eq!(fs::read_to_string(&out).unwrap(), fs::read_to_string(kept).unwrap());
+    let boards = [("board", &[][..]), ("charuco", &["--marker-mm", "14"][..])];
+    for ((name, more), ending) in boards.into_iter().flat_map(|b| [(b, "svg"), (b, "pdf")]) {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let kept = root.join(format!("calib/{name}_9x6_20mm_a4.{ending}"));
+        let out = scratch.path().join(format!("board.{ending}"));
+        let run = ["board", "--board", "9x6", "--square-mm", "20", "--out"];
+        truebead().args(run).arg(&out).args(more).assert().code(0);
+        assert!(fs::read(&out).unwrap() == fs::read(&kept).unwrap(), "{}", kept.display());
+    }
 }

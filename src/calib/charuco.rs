@@ -11,6 +11,7 @@ use super::marker::{self, Marker};
 use crate::bridge::{self, BridgeError};
 use crate::frame::Frame;
 use crate::geometry::ImagePoint;
+use crate::vision::rank;
 
 /// How far a marker's corner may be off its place, over the side of a square.
 const OFF: f64 = 0.3;
@@ -30,6 +31,10 @@ const FEWEST: usize = 3;
 const MOST_FIT: f64 = 0.7;
 /// How far the size of the markers may be off what was told.
 const SIZE: f64 = 0.12;
+/// The same \[px\]: a threshold takes up to a pixel off either side.
+const SIZE_PX: f64 = 3.0;
+/// Markers that tell their size.
+const SIZED: usize = 8;
 /// Markers of other dictionaries are looked for among so many of each: the more there
 /// are, the more often something else passes for one.
 const COMMON: usize = 250;
@@ -221,11 +226,7 @@ fn among(
     if fitting.len() < FEWEST || share(fitting.len(), markers.len()) < MOST_FIT {
         return Err(reason(board, dictionary, grey, quads, (fitting.len(), markers.len())));
     }
-    let found_percent = percent(size(&fitting, clear));
-    let expected_percent = percent(1.0 - 2.0 * clear);
-    if (f64::from(found_percent) / f64::from(expected_percent) - 1.0).abs() > SIZE {
-        return Err(NoMarkers::Size { found_percent, expected_percent });
-    }
+    check_size(&fitting, clear)?;
     Ok(foretold(board, &fitting, layout.first_has_marker))
 }
 
@@ -296,27 +297,38 @@ fn nearest(placed: &[Placed], at: Point2<f64>, count: usize) -> Vec<Placed> {
     sorted
 }
 
+/// Refuses markers of another size than was told, where there are enough of them to tell.
+fn check_size(placed: &[Placed], clear: f64) -> Result<(), NoMarkers> {
+    let told = 1.0 - 2.0 * clear;
+    let Some(found) = size(placed, clear).filter(|_| placed.len() >= SIZED) else {
+        return Ok(());
+    };
+    let mut sides: Vec<f64> = placed.iter().map(|one| one.marker.side_px()).collect();
+    let side_px = rank::median(&mut sides).unwrap_or(0.0);
+    let off = (found / told - 1.0).abs();
+    if off > SIZE && off * side_px > SIZE_PX {
+        let (found_percent, expected_percent) = (percent(found), percent(told));
+        return Err(NoMarkers::Size { found_percent, expected_percent });
+    }
+    Ok(())
+}
+
 /// Side of the markers over that of a square, where the markers' middles tell the
 /// squares.
-fn size(placed: &[Placed], clear: f64) -> f64 {
-    let mut ratios: Vec<f64> = placed
-        .iter()
-        .filter_map(|one| {
-            let near = nearest(placed, one.middle(), NEIGHBOURS + 1);
-            let middles = near.iter().map(|p| (p.middle(), p.marker.middle()));
-            let map = homography(&middles.collect::<Vec<_>>())?;
-            let sides = (0..4).map(|i| {
-                let ends = [one.on_board[i], one.on_board[(i + 1) % 4]];
-                Some((seen(&map, ends[1])? - seen(&map, ends[0])?).norm())
-            });
-            let expected = sides.sum::<Option<f64>>()? / 4.0;
-            Some(one.marker.side_px() / expected)
-        })
-        .filter(|ratio| ratio.is_finite())
-        .collect();
-    let middle = ratios.len() / 2;
-    let told = 1.0 - 2.0 * clear;
-    crate::vision::rank::at(&mut ratios, middle).map_or(told, |ratio| ratio * told)
+fn size(placed: &[Placed], clear: f64) -> Option<f64> {
+    let ratio = |one: &Placed| {
+        let near = nearest(placed, one.middle(), NEIGHBOURS + 1);
+        let middles = near.iter().map(|p| (p.middle(), p.marker.middle()));
+        let map = homography(&middles.collect::<Vec<_>>())?;
+        let sides = (0..4).map(|i| {
+            let ends = [one.on_board[i], one.on_board[(i + 1) % 4]];
+            Some((seen(&map, ends[1])? - seen(&map, ends[0])?).norm())
+        });
+        let expected = sides.sum::<Option<f64>>()? / 4.0;
+        Some(one.marker.side_px() / expected)
+    };
+    let mut ratios: Vec<f64> = placed.iter().filter_map(ratio).filter(|r| r.is_finite()).collect();
+    Some(rank::median(&mut ratios)? * (1.0 - 2.0 * clear))
 }
 
 /// Where the board's corners should be by the markers about them.

@@ -32,10 +32,11 @@ pub struct Trial {
     pub folds: bool,
 }
 
-/// The best choice and all that was tried. `None` where no lens leads to a camera.
-pub(super) fn best(views: &Views) -> Option<(Fit, Free, Vec<Trial>)> {
+/// Fits on a flat board with one lens after the other, each begun where the one before
+/// it ended, up to one with the most coefficients; those that lead nowhere left out.
+fn fits(views: &Views, most: Lens) -> Vec<(Fit, Trial)> {
     let mut fits: Vec<(Fit, Trial)> = Vec::new();
-    for lens in Lens::ALL {
+    for lens in Lens::ALL.into_iter().filter(|lens| *lens <= most) {
         let start = fits
             .last()
             .map_or_else(|| views.start.clone(), |(fit, _)| (fit.model, fit.places.clone()));
@@ -45,6 +46,12 @@ pub(super) fn best(views: &Views) -> Option<(Fit, Free, Vec<Trial>)> {
             fits.push((fit, trial));
         }
     }
+    fits
+}
+
+/// The best choice and all that was tried. `None` where no lens leads to a camera.
+pub(super) fn best(views: &Views) -> Option<(Fit, Free, Vec<Trial>)> {
+    let mut fits = fits(views, Lens::Rational);
     let chosen = chosen(&fits)?;
     let mut trials: Vec<Trial> = fits.iter().map(|(_, trial)| *trial).collect();
     let (fit, chosen) = fits.swap_remove(chosen);
@@ -79,17 +86,7 @@ fn chosen(fits: &[(Fit, Trial)]) -> Option<usize> {
 
 /// A fit with a lens that is given, by way of the simpler ones.
 pub(super) fn up_to(views: &Views, lens: Lens) -> Option<(Fit, Trial)> {
-    let mut start = views.start.clone();
-    for simpler in Lens::ALL.into_iter().take_while(|simpler| *simpler < lens) {
-        let free = Free { lens: Some(simpler), bend: false };
-        if let Some(fit) = bundle::fit(start.clone(), free, &views.boards) {
-            start = (fit.model, fit.places);
-        }
-    }
-    let free = Free { lens: Some(lens), bend: false };
-    let fit = bundle::fit(start, free, &views.boards)?;
-    let trial = trial(views, &fit, free);
-    Some((fit, trial))
+    fits(views, lens).pop().filter(|(_, trial)| trial.free.lens == Some(lens))
 }
 
 fn is_bent(views: &Views, fit: &Fit, free: Free) -> bool {

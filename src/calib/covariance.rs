@@ -70,7 +70,7 @@ impl Covariance {
             model,
             free,
             image_size_px: solution.image_size_px,
-            seen_px: seen_px(solution)?,
+            seen_px: solution.seen_px()?,
             bed: on_bed.place.clone(),
             on_bed: on_bed.boards.clone(),
             thickness,
@@ -228,15 +228,6 @@ fn eliminate(
     boards: &[Vec<Corner>],
 ) -> Option<Elimination> {
     Elimination::of(&Equations::of(model, free, place, boards)?)
-}
-
-/// First and last column and row between which the corners lie \[px\]; `None`
-/// without a corner.
-fn seen_px(solution: &Solution) -> Option<[ImagePoint; 2]> {
-    let corners =
-        || solution.views.iter().flat_map(|view| view.corners.iter().map(|corner| corner.px));
-    let (first, last) = (|a: ImagePoint, b| a.inf(&b), |a: ImagePoint, b| a.sup(&b));
-    Some([corners().reduce(first)?, corners().reduce(last)?])
 }
 
 #[cfg(test)]

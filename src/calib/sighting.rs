@@ -124,8 +124,11 @@ pub enum Refusal {
          markers are not of 4x4 cells"
     )]
     Marked,
-    /// A plain board where one with markers was told.
-    #[error("a plain checkerboard shows, not one with markers: leave out --marker-mm")]
+    /// A board whose markers are too small to be read, or a plain one.
+    #[error(
+        "a board shows, but no markers that can be read: if it is a plain one leave out \
+         --marker-mm, else bring it nearer to the camera"
+    )]
     Plain,
     /// The markers do not make the board.
     #[error(transparent)]
@@ -464,7 +467,7 @@ mod tests {
         assert!(size.starts_with("the markers measure 6"), "{size}");
         assert!(size.contains("% of a square's side, not 45 %"), "{size}");
         let plain = said(&shown, &picture(&board(9, 6), at, 7).0);
-        assert!(plain.contains("a plain checkerboard shows"), "{plain}");
+        assert!(plain.contains("if it is a plain one leave out --marker-mm"), "{plain}");
         let with = said(&board(9, 6), &frame);
         assert!(with.contains("give --marker-mm"), "{with}");
         let none =

@@ -107,6 +107,14 @@ impl Solution {
         &self.model.camera
     }
 
+    /// First and last column and row between which all corners were seen \[px\]; `None`
+    /// without a corner.
+    pub fn seen_px(&self) -> Option<[ImagePoint; 2]> {
+        let corners = || self.views.iter().flat_map(|view| view.corners.iter().map(|c| c.px));
+        let (first, last) = (|a: ImagePoint, b| a.inf(&b), |a: ImagePoint, b| a.sup(&b));
+        Some([corners().reduce(first)?, corners().reduce(last)?])
+    }
+
     /// Lowest and highest corner of all boards above a bed \[mm\], to a tenth; `None`
     /// without a board.
     pub fn heights_mm(&self, board: &Board, bed: &Pose) -> Option<[f64; 2]> {

@@ -64,6 +64,9 @@ pub enum VerifyError {
     /// A corner's ray misses the bed.
     #[error("not all of the board is seen on the bed, as the calibration has it")]
     OffBed,
+    /// Too small a part of a board with markers.
+    #[error("too little of the board shows: {:.0} % of a row or a column are needed", 100.0 * LEAST_PART)]
+    TooLittle,
     /// No pose.
     #[error("the corners fit no board before the calibration's camera")]
     NoPose,
@@ -84,7 +87,8 @@ pub fn verify(
     let (scale, rms_mm) = similarity(board, corners, &on_bed).ok_or(VerifyError::OffBed)?;
     let (height_mm, tilt_deg, reprojection_rms_px) =
         lies(camera, bed, board, corners, thickness).ok_or(VerifyError::NoPose)?;
-    let (worst_error, noise, worst_at) = worst(board, corners, &on_bed, reprojection_rms_px);
+    let (worst_error, noise, worst_at) =
+        worst(board, corners, &on_bed, reprojection_rms_px).ok_or(VerifyError::TooLittle)?;
     Ok(Findings {
         square_mm: scale * board.square().get(),
         scale_error: scale - 1.0,
@@ -137,16 +141,17 @@ fn similarity(board: &Board, corners: &[Seen], on_bed: &[Point2<f64>]) -> Option
 }
 
 /// The error of a distance along a row or a column that is furthest beyond its noise,
-/// as a share, with that noise and where it is.
+/// as a share, with that noise and where it is. `None` where no two corners are as far
+/// apart in a row or a column.
 #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
 fn worst(
     board: &Board,
     corners: &[Seen],
     on_bed: &[Point2<f64>],
     rms_px: f64,
-) -> (f64, f64, (f64, f64, f64)) {
+) -> Option<(f64, f64, (f64, f64, f64))> {
     let (columns, _) = board.corners();
-    let mut worst = (0.0_f64, f64::INFINITY, (0.0, 0.0, 0.0));
+    let mut worst: Option<(f64, f64, (f64, f64, f64))> = None;
     for (i, a) in corners.iter().enumerate() {
         for (j, b) in corners.iter().enumerate().skip(i + 1) {
             let at = |index: usize| (index % columns, index / columns);
@@ -165,10 +170,10 @@ fn worst(
             let error = (on_bed[j] - on_bed[i]).norm() / true_mm - 1.0;
             // Two ends, each off by 1/√2 of the RMS along the way between them.
             let noise = NOISE * rms_px / (b.px - a.px).norm();
-            if error.abs() - noise > worst.0.abs() - worst.1 {
+            if worst.is_none_or(|(most, of_it, _)| error.abs() - noise > most.abs() - of_it) {
                 let middle = |a: usize, b: usize| 0.5 * (a + b) as f64;
                 let place = (middle(column, other_column), middle(row, other_row), true_mm);
-                worst = (error, noise, place);
+                worst = Some((error, noise, place));
             }
         }
     }

@@ -5,6 +5,7 @@ use maud::{Markup, html};
 use crate::calib::map::{CELLS, WidthMap};
 use crate::calib::solve::{Solution, View};
 use crate::offline::report::palette::{GAUGE, Ink, LEFT_EDGE, REJECTED, WIDTH};
+use crate::vision::rank;
 
 /// Width of a drawing on the page [units of its own].
 const WIDE: f64 = 960.0;
@@ -89,8 +90,7 @@ pub fn magnification(solution: &Solution) -> f64 {
         .iter()
         .flat_map(|view| view.errors_px.iter().map(nalgebra::Matrix::norm))
         .collect();
-    ways.sort_by(f64::total_cmp);
-    let median = ways.get(ways.len() / 2).copied().unwrap_or(1.0).max(1e-6);
+    let median = rank::median(&mut ways).unwrap_or(1.0).max(1e-6);
     let times = DRAWN * typical_side(solution) / median;
     // A round number is easier to divide by.
     let power = 10_f64.powf(times.log10().floor());
@@ -104,8 +104,7 @@ fn typical_side(solution: &Solution) -> f64 {
         pairs.map(|pair| (pair[1].px - pair[0].px).norm()).collect()
     };
     let mut sides: Vec<f64> = solution.views.iter().flat_map(neighbours).collect();
-    sides.sort_by(f64::total_cmp);
-    sides.get(sides.len() / 2).copied().unwrap_or(10.0)
+    rank::median(&mut sides).unwrap_or(10.0)
 }
 
 /// Every corner with its way from where it is expected.
@@ -158,12 +157,7 @@ pub fn width_map(solution: &Solution, map: &WidthMap) -> Markup {
 
 /// The part of the picture in which boards were seen.
 fn seen(drawing: Drawing, solution: &Solution, ink: Ink) -> Markup {
-    let corners = || solution.views.iter().flat_map(|view| view.corners.iter().map(|c| c.px));
-    let (Some(from), Some(to)) =
-        (corners().reduce(|a, b| a.inf(&b)), corners().reduce(|a, b| a.sup(&b)))
-    else {
-        return html! {};
-    };
+    let Some([from, to]) = solution.seen_px() else { return html! {} };
     let (left, top) = (drawing.x(from.x), drawing.y(from.y));
     html! {
         rect x=(left) y=(top) width=(round(drawing.x(to.x) - left)) height=(round(drawing.y(to.y) - top))
