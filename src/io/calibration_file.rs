@@ -10,12 +10,12 @@ use crate::config::Problems;
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationFileError {
     /// It cannot be read.
-    #[error("calibration file {}: {source}; `truebead calibrate` makes one", path.display())]
+    #[error("calibration file {}: {what}; `truebead calibrate` makes one", path.display())]
     Read {
         /// Which file.
         path: PathBuf,
         /// What the system says.
-        source: io::Error,
+        what: io::Error,
     },
     /// What stands in it is wrong.
     #[error(transparent)]
@@ -26,7 +26,7 @@ pub enum CalibrationFileError {
 /// once.
 pub fn read(path: &Path) -> Result<Calibration, CalibrationFileError> {
     let text = fs::read_to_string(path)
-        .map_err(|source| CalibrationFileError::Read { path: path.to_owned(), source })?;
+        .map_err(|what| CalibrationFileError::Read { path: path.to_owned(), what })?;
     Ok(file::parse(&path.display().to_string(), &text)?)
 }
 

@@ -49,20 +49,20 @@ pub enum DecodeError {
 #[derive(Debug, thiserror::Error)]
 pub enum ImageFileError {
     /// It cannot be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {what}", path.display())]
     Read {
         /// Which file.
         path: PathBuf,
         /// What the system says.
-        source: io::Error,
+        what: io::Error,
     },
     /// It cannot be understood.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {what}", path.display())]
     Decode {
         /// Which file.
         path: PathBuf,
         /// What is wrong with it.
-        source: DecodeError,
+        what: DecodeError,
     },
 }
 
@@ -92,9 +92,9 @@ pub fn read(
     captured_at: Stamp,
 ) -> Result<Frame, ImageFileError> {
     let bytes =
-        fs::read(path).map_err(|source| ImageFileError::Read { path: path.to_owned(), source })?;
+        fs::read(path).map_err(|what| ImageFileError::Read { path: path.to_owned(), what })?;
     decode(&bytes, channel, seq, captured_at)
-        .map_err(|source| ImageFileError::Decode { path: path.to_owned(), source })
+        .map_err(|what| ImageFileError::Decode { path: path.to_owned(), what })
 }
 
 /// Decodes the bytes of an image file; the format is told from the first

@@ -32,12 +32,12 @@ const BUFFER_BYTES: usize = 1 << 16;
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
     /// It cannot be opened or read.
-    #[error("{file}: {source}")]
+    #[error("{file}: {what}")]
     Io {
         /// The file.
         file: String,
         /// Why.
-        source: io::Error,
+        what: io::Error,
     },
     /// It is something else.
     #[error(
@@ -136,7 +136,7 @@ impl Recording {
         });
         match opened {
             Ok(opened) => Self::read(BufReader::with_capacity(BUFFER_BYTES, opened), file),
-            Err(source) => Err(RecordingError::Io { file, source }),
+            Err(what) => Err(RecordingError::Io { file, what }),
         }
     }
 
@@ -149,7 +149,7 @@ impl Recording {
         let messages = match Messages::new(source) {
             Ok(Some(messages)) => messages,
             Ok(None) => return Err(RecordingError::NotMcap { file }),
-            Err(source) => return Err(RecordingError::Io { file, source }),
+            Err(what) => return Err(RecordingError::Io { file, what }),
         };
         let attachments = BTreeMap::new();
         let mut recording = Self { file, messages, first: None, run: None, attachments };
@@ -200,7 +200,7 @@ impl Recording {
         }
         loop {
             let item = self.messages.next_item();
-            match item.map_err(|source| RecordingError::Io { file: self.file.clone(), source })? {
+            match item.map_err(|what| RecordingError::Io { file: self.file.clone(), what })? {
                 None => return Ok(None),
                 Some(Item::Message(message)) => return Ok(Some(message)),
                 Some(Item::Attachment { name, data }) => {

@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 
 /// A file that could not be written; nothing has changed under its name.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot write {}: {source}", path.display())]
+#[error("cannot write {}: {what}", path.display())]
 pub struct WriteError {
     /// Where it should have gone.
     pub path: PathBuf,
-    /// What the system says.
-    pub source: io::Error,
+    /// What the system says; told with the path, and not once more as its cause.
+    pub what: io::Error,
 }
 
 /// What any program would ask for; the user's umask takes its part off.
@@ -21,7 +21,15 @@ const MODE: u32 = 0o666;
 /// Writes beside the final name and renames when everything is on the disk.
 /// An older file of this name is replaced.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    write_and_rename(path, bytes).map_err(|source| WriteError { path: path.to_owned(), source })
+    write_and_rename(path, bytes)
+        .map_err(|error| WriteError { path: path.to_owned(), what: of_the_system(error) })
+}
+
+/// Without the name of the file beside, which the user has not asked for.
+fn of_the_system(error: io::Error) -> io::Error {
+    let inner = error.get_ref().and_then(|wrapped| wrapped.source());
+    let code = inner.and_then(|inner| inner.downcast_ref::<io::Error>()?.raw_os_error());
+    code.map_or(error, io::Error::from_raw_os_error)
 }
 
 fn write_and_rename(path: &Path, bytes: &[u8]) -> io::Result<()> {
@@ -64,6 +72,8 @@ mod tests {
     #[test]
     fn a_missing_folder_is_named() {
         let error = write_whole(Path::new("no/such/folder/x.toml"), b"").unwrap_err();
-        assert!(error.to_string().starts_with("cannot write no/such/folder/x.toml: "));
+        let said = error.to_string();
+        assert!(said.starts_with("cannot write no/such/folder/x.toml: No such file"), "{said}");
+        assert!(!said.contains(".truebead-") && std::error::Error::source(&error).is_none());
     }
 }

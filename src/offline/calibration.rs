@@ -58,9 +58,10 @@ impl Page<'_> {
         let (columns, rows) = self.board.corners();
         let [width, height] = self.solution.image_size_px;
         let model = self.solution.free.lens.map_or("none", |lens| lens.name());
+        let kind = if self.board.is_plain() { "board" } else { "ChArUco board" };
         html! {
             div.about {
-                span { "board " b { (columns) "x" (rows) " corners, " (self.board.square()) } }
+                span { (kind) " " b { (columns) "x" (rows) " corners, " (self.board.square()) } }
                 span { "pictures " b { (self.solution.views.len()) " of " (self.looks.len()) } }
                 span { "size " b { (width) "x" (height) " px" } }
                 span { "lens " b { (model) } }

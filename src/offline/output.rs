@@ -104,7 +104,7 @@ impl Write for Partial {
 pub fn write_whole(folder: &Path, name: &str, content: &[u8]) -> Result<PathBuf, LogError> {
     let path = folder.join(name);
     whole_file::write_whole(&path, content)
-        .map_err(|error| LogError::Write { path: error.path, source: error.source })?;
+        .map_err(|error| LogError::Write { path: error.path, source: error.what })?;
     Ok(path)
 }
 
