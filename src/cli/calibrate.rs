@@ -2,8 +2,8 @@
 
 mod conclusion;
 mod live;
-mod plane;
-mod report;
+pub(super) mod plane;
+pub(super) mod report;
 
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -130,7 +130,7 @@ fn parse_dictionary(text: &str) -> Result<Dictionary, String> {
     })
 }
 
-fn parse_board(text: &str) -> Result<(usize, usize), String> {
+pub(super) fn parse_board(text: &str) -> Result<(usize, usize), String> {
     let sides = text.split_once(['x', 'X', '×']);
     let number = |side: &str| side.trim().parse::<usize>().ok();
     sides
@@ -148,7 +148,7 @@ pub(super) fn parse_length(text: &str) -> Result<Mm, String> {
 }
 
 /// The side of a square that can be printed and seen.
-fn parse_square(text: &str) -> Result<Mm, String> {
+pub(super) fn parse_square(text: &str) -> Result<Mm, String> {
     let side = parse_length(text)?;
     let (smallest, largest) = SQUARES_MM;
     if (smallest..=largest).contains(&side.get()) {
@@ -216,15 +216,7 @@ fn check_lengths(args: &CalibrateArgs) -> Result<(), WrongArguments> {
         return Err(WrongArguments::new(what));
     }
     for (name, path) in [("out", &args.out), ("report", &report)] {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-            let what = format!("--{name} {}: no folder {}", path.display(), folder.display());
-            return Err(WrongArguments::new(what));
-        }
-        if path.is_dir() {
-            let what = format!("--{name} {}: a folder, expected a file", path.display());
-            return Err(WrongArguments::new(what));
-        }
+        check_writable(name, path)?;
     }
     if args.board_thickness_mm < Mm::ZERO {
         return Err(WrongArguments::new("the board's thickness cannot be below 0 mm"));
@@ -245,9 +237,23 @@ fn check_lengths(args: &CalibrateArgs) -> Result<(), WrongArguments> {
     Ok(())
 }
 
+/// Finds a mistyped place for a file before the long work; `name` is the option's.
+pub(super) fn check_writable(name: &str, path: &Path) -> Result<(), WrongArguments> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        let what = format!("--{name} {}: no folder {}", path.display(), folder.display());
+        return Err(WrongArguments::new(what));
+    }
+    if path.is_dir() {
+        let what = format!("--{name} {}: a folder, expected a file", path.display());
+        return Err(WrongArguments::new(what));
+    }
+    Ok(())
+}
+
 /// Writes to standard output. A reader that has gone away, such as `head`, is no
 /// reason to stop.
-fn say(text: &str) {
+pub(super) fn say(text: &str) {
     let _ = std::io::stdout().write_all(text.as_bytes());
 }
 
@@ -271,6 +277,18 @@ pub fn look_at(board: &Board, name: &str, path: &Path) -> Result<Sighting, Refus
     let frame = image_file::read(path, Channel::Grey, 0, Stamp::START)
         .map_err(|error| Refusal::Unreadable(error.to_string()))?;
     sighting::look(board, name, &frame)
+}
+
+/// Fails for a picture that is not of the size that a calibration is for.
+pub(super) fn check_size(sighting: &Sighting, expected: [u32; 2]) -> anyhow::Result<()> {
+    let ([width, height], [right, bottom]) = (sighting.image_size_px, expected);
+    anyhow::ensure!(
+        sighting.image_size_px == expected,
+        "{}: {width}x{height} px, but the calibration is for {right}x{bottom} px: take the \
+         picture as the camera was calibrated, or calibrate anew",
+        sighting.name
+    );
+    Ok(())
 }
 
 fn progress(count: usize) -> ProgressBar {

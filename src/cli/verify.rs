@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::Args;
 
 use super::WrongArguments;
-use super::calibrate::{BoardArgs, look_at, parse_length};
+use super::calibrate::{BoardArgs, check_size, look_at, parse_length};
 use crate::calib::Calibration;
 use crate::calib::verify::{Findings, verify};
 use crate::io::calibration_file;
@@ -68,14 +68,8 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     let calibration = calibration_file::read(&args.calibration)?;
     let name = args.image.display().to_string();
     let sighting = look_at(&board, &name, &args.image).with_context(|| name.clone())?;
-    if let Some(expected) = calibration.image_size_px()
-        && expected != sighting.image_size_px
-    {
-        let ([width, height], [right, bottom]) = (sighting.image_size_px, expected);
-        bail!(
-            "{name}: {width}x{height} px, but the calibration is for {right}x{bottom} px: take the \
-             picture as the camera was calibrated, or calibrate anew"
-        );
+    if let Some(expected) = calibration.image_size_px() {
+        check_size(&sighting, expected)?;
     }
     let found = verify(&calibration, &board, &sighting.corners, args.board_thickness_mm)
         .map_err(anyhow::Error::from)

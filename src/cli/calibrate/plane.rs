@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-use super::{CalibrateArgs, Pictures, WrongArguments, look_at};
+use super::{CalibrateArgs, Pictures, WrongArguments, check_size, look_at};
 use crate::calib::board::{Board, Seen};
-use crate::calib::equations::Corner;
+use crate::calib::equations::{Corner, Model};
 use crate::calib::plane::OnBed;
 use crate::calib::sighting::{Looks, Refusal, is_same_place};
 use crate::calib::solve::Solution;
@@ -68,31 +68,71 @@ pub fn find(
     pictures: &Pictures,
 ) -> anyhow::Result<Plane> {
     let Pictures { files, looks, on_bed: named } = pictures;
-    let mut found: Vec<(String, Vec<Seen>)> = Vec::new();
+    let mut boards = Boards::of(board);
     let mut passed_over = Vec::new();
     if named.is_empty() {
         let (last, later) = last_seen(solution, looks).context("no picture shows the board")?;
-        found.push((last.to_owned(), corners_of(solution, last).unwrap_or_default()));
+        boards.add(last.to_owned(), corners_of(solution, last).unwrap_or_default())?;
         passed_over = later;
     }
     for path in named {
         let (image, corners) = on_bed(path, board, solution, (files, looks))?;
-        let is_twin = |(_, other): &&(String, Vec<Seen>)| is_same_place(board, other, &corners);
-        if let Some((twin, _)) = found.iter().find(is_twin) {
+        boards.add(image, corners)?;
+    }
+    let most_px = (OFF * solution.rms_px).max(OFF_PX);
+    let other = format!("the other pictures have {:.2} px", solution.rms_px);
+    let (images, on_bed) = boards.fit(&solution.model, most_px, &other)?;
+    Ok(Plane {
+        images,
+        assumed: named.is_empty(),
+        passed_over,
+        on_bed,
+        thickness: args.board_thickness_mm,
+        robot_z: args.robot_z_mm,
+    })
+}
+
+/// Boards of one kind that are said to lie on the bed, each with its image.
+pub struct Boards<'a> {
+    board: &'a Board,
+    seen: Vec<(String, Vec<Seen>)>,
+}
+
+impl<'a> Boards<'a> {
+    /// None yet.
+    pub fn of(board: &'a Board) -> Self {
+        Self { board, seen: Vec::new() }
+    }
+
+    /// Fails for one that is where another is.
+    pub fn add(&mut self, image: String, corners: Vec<Seen>) -> anyhow::Result<()> {
+        let is_twin = |(_, other): &&(String, Vec<Seen>)| is_same_place(self.board, other, &corners);
+        if let Some((twin, _)) = self.seen.iter().find(is_twin) {
             bail!(
                 "--plane {image}: the board is where it is in {twin}, which says nothing new; leave \
                  one of them out, or move the board on the bed"
             );
         }
-        found.push((image, corners));
+        self.seen.push((image, corners));
+        Ok(())
     }
-    let (images, boards): (Vec<String>, Vec<Vec<Corner>>) =
-        found.into_iter().map(|(image, seen)| (image, board.place(&seen))).unzip();
-    let on_bed = OnBed::fit(&solution.model, boards)
-        .with_context(|| format!("the corners in {} fit no plane", images.join(", ")))?;
-    let most_px = (OFF * solution.rms_px).max(OFF_PX);
-    if on_bed.rms_px > most_px {
+
+    /// One plane through all of them, with the images' names. Fails where corners are
+    /// further off it than `most_px` (RMS); `other` says what they are held against.
+    pub fn fit(
+        self,
+        model: &Model,
+        most_px: f64,
+        other: &str,
+    ) -> anyhow::Result<(Vec<String>, OnBed)> {
+        let placed = self.seen.into_iter().map(|(image, seen)| (image, self.board.place(&seen)));
+        let (images, boards): (Vec<String>, Vec<Vec<Corner>>) = placed.unzip();
         let names = images.join(", ");
+        let on_bed = OnBed::fit(model, boards)
+            .with_context(|| format!("the corners in {names} fit no plane"))?;
+        if on_bed.rms_px <= most_px {
+            return Ok((images, on_bed));
+        }
         if images.len() > 1 {
             bail!(
                 "the boards in {names} do not lie on one plane: corners are {:.2} px off (RMS), the \
@@ -103,20 +143,11 @@ pub fn find(
             );
         }
         bail!(
-            "{names}: corners are {:.2} px off (RMS) where the other pictures have {:.2} px; was it \
-             taken with the same camera, focus and zoom?",
-            on_bed.rms_px,
-            solution.rms_px
+            "{names}: corners are {:.2} px off (RMS) where {other}; was it taken with the same camera, \
+             focus and zoom?",
+            on_bed.rms_px
         );
     }
-    Ok(Plane {
-        images,
-        assumed: named.is_empty(),
-        passed_over,
-        on_bed,
-        thickness: args.board_thickness_mm,
-        robot_z: args.robot_z_mm,
-    })
 }
 
 /// The last picture that shows a board, or its twin where the board was in its place
@@ -156,27 +187,25 @@ fn on_bed(
                 .map(|corners| (name.clone(), corners))
                 .with_context(|| format!("--plane {name}: not used")),
             // A board that is in one place twice still lies on the bed.
-            Err(Refusal::Duplicate { .. }) => looked_for(file, board, solution),
+            Err(Refusal::Duplicate { .. }) => looked_for(file, board, solution.image_size_px),
             Err(refusal) => {
                 bail!("--plane {name}: {refusal}; name an image that shows the whole board")
             }
         };
     }
-    looked_for(path, board, solution)
+    looked_for(path, board, solution.image_size_px)
 }
 
-fn looked_for(
+/// The board's corners in an image that took no part in finding the camera, which must
+/// be of the size \[px\] that the camera is for.
+pub fn looked_for(
     path: &Path,
     board: &Board,
-    solution: &Solution,
+    image_size_px: [u32; 2],
 ) -> anyhow::Result<(String, Vec<Seen>)> {
     let name = path.display().to_string();
     let sighting = look_at(board, &name, path)
         .with_context(|| format!("--plane {name} does not show the bed plane"))?;
-    if sighting.image_size_px != solution.image_size_px {
-        let refusal =
-            Refusal::Size { found: sighting.image_size_px, expected: solution.image_size_px };
-        bail!("--plane {name}: {refusal}");
-    }
+    check_size(&sighting, image_size_px)?;
     Ok((name, sighting.corners))
 }
