@@ -12,6 +12,7 @@ pub mod covariance;
 pub mod coverage;
 pub mod dictionary;
 pub mod equations;
+pub mod exchange;
 pub mod file;
 pub mod focus;
 mod grey;

@@ -82,6 +82,25 @@ impl Camera {
         Self { focal_px: [fx, fy], centre_px: [cx, cy], distortion }
     }
 
+    /// Its matrix, row by row: without skew.
+    pub fn matrix(&self) -> [f64; 9] {
+        let ([fx, fy], [cx, cy]) = (self.focal_px, self.centre_px);
+        [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]
+    }
+
+    /// The coefficients that are written: five, or the eight of the rational model.
+    pub fn coefficients(&self) -> &[f64] {
+        let five = self.distortion[5..].iter().all(|&k| k == 0.0);
+        &self.distortion[..if five { 5 } else { COEFFICIENTS }]
+    }
+
+    /// Whether the lens can be undone in the middle of a picture of this size \[px\],
+    /// as that of any camera can.
+    pub fn reaches_middle(&self, size: [u32; 2]) -> bool {
+        let middle = size.map(|side| (f64::from(side) - 1.0) / 2.0);
+        self.ray(Point2::from(middle)).is_some()
+    }
+
     /// Projects a point in camera axes \[mm\] to the image \[px\]; `None`
     /// behind the camera.
     pub fn project(&self, p: Point3<f64>) -> Option<ImagePoint> {

@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 
 use super::camera::COEFFICIENTS;
 use super::lens::Lens;
@@ -14,15 +14,15 @@ use crate::geometry::Pose;
 use crate::units::Mm;
 
 /// Largest image side that is taken \[px\].
-const MAX_SIDE_PX: f64 = 65_536.0;
+pub(super) const MAX_SIDE_PX: f64 = 65_536.0;
 /// A focal length of less is no lens, of more no camera \[px\].
-const FOCAL_PX: std::ops::RangeInclusive<f64> = 1.0..=1e7;
-const CENTRE_PX: std::ops::RangeInclusive<f64> = -1e6..=1e6;
-const DISTORTION: std::ops::RangeInclusive<f64> = -1e6..=1e6;
+pub(super) const FOCAL_PX: std::ops::RangeInclusive<f64> = 1.0..=1e7;
+pub(super) const CENTRE_PX: std::ops::RangeInclusive<f64> = -1e6..=1e6;
+pub(super) const DISTORTION: std::ops::RangeInclusive<f64> = -1e6..=1e6;
 /// A Rodrigues vector is a turn of at most one round an axis.
 const TURN_RAD: std::ops::RangeInclusive<f64> = -6.3..=6.3;
 const LENGTH_MM: std::ops::RangeInclusive<f64> = -1e6..=1e6;
-const RMS_PX: std::ops::RangeInclusive<f64> = 0.0..=1e3;
+pub(super) const RMS_PX: std::ops::RangeInclusive<f64> = 0.0..=1e3;
 /// A calibration that leaves more than the width itself open is none.
 const SHARE: std::ops::RangeInclusive<f64> = 0.0..=1.0;
 
@@ -89,8 +89,7 @@ fn read_camera(table: &Table<'_>, size: Option<[u32; 2]>) -> Option<Camera> {
     distortion.iter_mut().zip(row).for_each(|(to, from)| *to = from);
     let camera =
         Camera { focal_px: [focal.0?, focal.1?], centre_px: [centre.0?, centre.1?], distortion };
-    let middle = size.map(|size| size.map(|side| (f64::from(side) - 1.0) / 2.0));
-    if middle.is_some_and(|middle| camera.ray(Point2::from(middle)).is_none()) {
+    if size.is_some_and(|size| !camera.reaches_middle(size)) {
         let found = "a lens that cannot be undone in the middle of the picture";
         table.report("distortion", found, "coefficients of this camera");
         return None;
@@ -127,9 +126,9 @@ pub fn to_toml(
     }
     let [fx, fy] = camera.focal_px;
     let [cx, cy] = camera.centre_px;
-    let five = camera.distortion[5..].iter().all(|&k| k == 0.0);
-    let distortion = &camera.distortion[..if five { 5 } else { COEFFICIENTS }];
-    let names = if five { Lens::Five } else { Lens::Rational }.name();
+    let distortion = camera.coefficients();
+    let is_rational = distortion.len() == COEFFICIENTS;
+    let names = if is_rational { Lens::Rational } else { Lens::Five }.name();
     let rotation: [f64; 3] = bed.rotation_rad().into();
     let translation: [f64; 3] = bed.translation_mm().into();
     let _ = write!(
@@ -178,6 +177,7 @@ pub fn to_toml(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Point2;
 
     const EXAMPLE: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/calib/example.toml"));
 

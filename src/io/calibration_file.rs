@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
+use crate::calib::exchange::{self, Import};
 use crate::calib::{Calibration, file};
 use crate::config::Problems;
 
@@ -17,6 +18,14 @@ pub enum CalibrationFileError {
         /// What the system says.
         what: io::Error,
     },
+    /// A YAML file of others cannot be read.
+    #[error("{}: cannot be read", path.display())]
+    ReadYaml {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
     /// What stands in it is wrong.
     #[error(transparent)]
     Content(#[from] Problems),
@@ -28,6 +37,14 @@ pub fn read(path: &Path) -> Result<Calibration, CalibrationFileError> {
     let text = fs::read_to_string(path)
         .map_err(|what| CalibrationFileError::Read { path: path.to_owned(), what })?;
     Ok(file::parse(&path.display().to_string(), &text)?)
+}
+
+/// Reads a camera from the YAML of ROS or OpenCV; everything that is wrong with it is
+/// reported at once.
+pub fn read_exchanged(path: &Path) -> Result<Import, CalibrationFileError> {
+    let text = fs::read_to_string(path)
+        .map_err(|source| CalibrationFileError::ReadYaml { path: path.to_owned(), source })?;
+    Ok(exchange::parse(&path.display().to_string(), &text)?)
 }
 
 #[cfg(test)]
