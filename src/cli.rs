@@ -22,6 +22,7 @@ pub mod board;
 pub mod calibrate;
 pub mod cell;
 pub mod check;
+pub mod convert;
 pub mod demo;
 pub mod outcome;
 pub mod process;
@@ -72,6 +73,7 @@ enum Command {
     Calibrate(calibrate::CalibrateArgs),
     Board(board::SheetArgs),
     Verify(verify::VerifyArgs),
+    Convert(convert::ConvertArgs),
     Simulate(simulate::SimulateArgs),
     Render(render::RenderArgs),
     RobotSim(robot_sim::RobotSimArgs),
@@ -112,6 +114,7 @@ pub fn main() -> ExitCode {
         Command::Process(args) => process::run(args, voice),
         Command::Board(args) => board::run(args).map(|()| ExitCode::SUCCESS),
         Command::Verify(args) => verify::run(args),
+        Command::Convert(args) => convert::run(args, voice).map(|()| ExitCode::SUCCESS),
         Command::Calibrate(args) => calibrate::run(args),
         Command::Simulate(args) => simulate::run(args, voice),
         Command::Render(args) => render::run(args, voice).map(|()| ExitCode::SUCCESS),

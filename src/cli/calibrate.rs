@@ -116,15 +116,23 @@ pub struct BoardArgs {
 impl BoardArgs {
     /// Fails for a board that cannot be used.
     pub fn board(&self) -> Result<Board, WrongArguments> {
-        let (columns, rows) = self.board;
-        let plain = Board::new(columns, rows, self.square_mm).map_err(WrongArguments::new)?;
-        let Some(side) = self.marker_mm else { return Ok(plain) };
-        let marks = Marks { side, dictionary: self.dictionary };
-        plain.with_marks(marks).map_err(WrongArguments::new)
+        board_of(self.board, self.square_mm, (self.marker_mm, self.dictionary))
     }
 }
 
-fn parse_dictionary(text: &str) -> Result<Dictionary, String> {
+/// A board of so many inner corners, with markers where their side is given. Fails for one
+/// that cannot be used.
+pub(super) fn board_of(
+    (columns, rows): (usize, usize),
+    square: Mm,
+    (marker, dictionary): (Option<Mm>, Dictionary),
+) -> Result<Board, WrongArguments> {
+    let plain = Board::new(columns, rows, square).map_err(WrongArguments::new)?;
+    let Some(side) = marker else { return Ok(plain) };
+    plain.with_marks(Marks { side, dictionary }).map_err(WrongArguments::new)
+}
+
+pub(super) fn parse_dictionary(text: &str) -> Result<Dictionary, String> {
     Dictionary::named(text).ok_or_else(|| {
         "expected 4x4, 5x5, 6x6 or 7x7, or a name of OpenCV's such as DICT_5X5_100".to_owned()
     })
@@ -164,7 +172,7 @@ const LONGEST_MM: f64 = 1e5;
 const SQUARES_MM: (f64, f64) = (0.01, 1e4);
 
 /// Pictures that were looked at.
-struct Pictures {
+pub(super) struct Pictures {
     files: Vec<PathBuf>,
     looks: Looks,
     /// Those whose boards lay on the bed; none where the last one is to be taken.

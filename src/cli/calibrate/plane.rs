@@ -106,7 +106,8 @@ impl<'a> Boards<'a> {
 
     /// Fails for one that is where another is.
     pub fn add(&mut self, image: String, corners: Vec<Seen>) -> anyhow::Result<()> {
-        let is_twin = |(_, other): &&(String, Vec<Seen>)| is_same_place(self.board, other, &corners);
+        let is_twin =
+            |(_, other): &&(String, Vec<Seen>)| is_same_place(self.board, other, &corners);
         if let Some((twin, _)) = self.seen.iter().find(is_twin) {
             bail!(
                 "--plane {image}: the board is where it is in {twin}, which says nothing new; leave \
