@@ -4,6 +4,7 @@
 pub mod event;
 pub mod follow;
 pub mod limiter;
+pub mod offset;
 pub mod pi;
 pub mod step;
 pub mod transport;
