@@ -22,6 +22,7 @@ pub mod map;
 mod marker;
 pub mod model;
 pub mod next_view;
+pub mod offset;
 pub mod outline;
 pub mod plane;
 pub mod quality;
