@@ -24,6 +24,7 @@ pub mod cell;
 pub mod check;
 pub mod convert;
 pub mod demo;
+pub mod offset;
 pub mod outcome;
 pub mod process;
 pub mod render;
@@ -81,6 +82,7 @@ enum Command {
     Reproduce(reproduce::ReproduceArgs),
     Accuracy(accuracy::AccuracyArgs),
     Check(check::CheckArgs),
+    Offset(offset::OffsetArgs),
 }
 
 /// How much a command says on standard error.
@@ -123,6 +125,7 @@ pub fn main() -> ExitCode {
         Command::Replay(args) => replay::run(args),
         Command::Accuracy(args) => accuracy::run(args, voice),
         Command::Check(args) => check::run(args),
+        Command::Offset(args) => offset::run(args),
     };
     done.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");

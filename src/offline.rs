@@ -10,6 +10,7 @@ pub mod calibration;
 pub mod edges;
 pub mod log;
 pub mod names;
+pub mod offset;
 pub mod output;
 pub mod picker;
 pub mod picture;

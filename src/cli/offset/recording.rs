@@ -1,0 +1,107 @@
+//! From a bead that was recorded.
+
+use std::path::Path;
+
+use anyhow::Context;
+
+use super::super::WrongArguments;
+use super::super::cell::LoadedCell;
+use super::{OffsetArgs, tell};
+use crate::calib::{Calibration, file};
+use crate::config::Cell;
+use crate::config::cell::{CalibrationSource, Purpose};
+use crate::control::offset::{EXPONENTS, Found, Search, find};
+use crate::io::recording::Recording;
+use crate::offline::offset::{Print, gauge_length, print};
+use crate::units::Mm;
+
+/// Largest offset that is tried unless another is given.
+const FARTHEST: Mm = Mm::constant(1000.0);
+/// Smallest range of offsets that is a range \[mm\].
+const SHORTEST_SEARCH_MM: f64 = 1.0;
+
+/// Runs the command for a recording.
+pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
+    let farthest = args.max_mm.unwrap_or(FARTHEST);
+    if farthest.get() < SHORTEST_SEARCH_MM {
+        let what = format!("--max-mm: found {farthest}, expected {SHORTEST_SEARCH_MM} mm or more");
+        return Err(WrongArguments::new(what).into());
+    }
+    let mut recording = Recording::open(&args.input).map_err(WrongArguments::new)?;
+    let cell = match &args.cell {
+        Some(path) => Some(LoadedCell::read(path, Purpose::Measure)?),
+        None => None,
+    };
+    let (cell, calibration) = match cell {
+        Some(loaded) => (loaded.cell, loaded.calibration),
+        None => attached(&recording)?,
+    };
+    let name = args.input.display().to_string();
+    let print = print(&mut recording).context("the recording cannot be read on")?;
+    if let Some(what) = recording.integrity().summary() {
+        eprintln!("warning: {name}: {what}");
+    }
+    let gauge = gauge(&cell, &calibration, &print)?;
+    let found = find(&print.states, &print.widths, Search { gauge, farthest })
+        .with_context(|| format!("{name} does not tell the offset"))?;
+    let now = cell.run.as_ref().map(|run| run.camera.offset);
+    answer(&found, &print, gauge, now);
+    Ok(())
+}
+
+/// The cell as it was in the run.
+fn attached(recording: &Recording) -> anyhow::Result<(Cell, Calibration)> {
+    let file = recording.file();
+    let Some(text) = recording.cell() else {
+        let what = format!("{file}: no cell file is attached to it; give one with --cell");
+        return Err(WrongArguments::new(what).into());
+    };
+    let name = format!("cell.toml in {file}");
+    let cell = Cell::parse(Path::new(&name), text, Purpose::Measure)?;
+    let calibration = match &cell.calibration {
+        CalibrationSource::Scale { mm_per_px, sigma } => {
+            Calibration::Scale { mm_per_px: *mm_per_px, sigma: *sigma }
+        }
+        CalibrationSource::File(_) => {
+            let text = recording.calibration().ok_or_else(|| {
+                let what = format!("{file}: its calibration is not attached; give a --cell");
+                WrongArguments::new(what)
+            })?;
+            file::parse(&format!("the calibration in {file}"), text)?
+        }
+    };
+    Ok((cell, calibration))
+}
+
+/// Length of the gauge on the surface of then.
+fn gauge(cell: &Cell, calibration: &Calibration, print: &Print) -> anyhow::Result<Mm> {
+    let robot_z = print.states.last().map(|(_, state)| state.z_mm);
+    let map = cell.surface(calibration, robot_z);
+    gauge_length(&cell.gauge, &map).ok_or_else(|| {
+        let what = "gauge.roi_px does not see the surface, as the calibration has it";
+        WrongArguments::new(what).into()
+    })
+}
+
+fn answer(found: &Found, print: &Print, gauge: Mm, now: Option<Mm>) {
+    let (from, to) = found.speeds;
+    let (offset, sigma) = (found.offset.get(), found.sigma.get());
+    say!("offset     {offset:.2} ± {sigma:.2} mm from the nozzle to the middle of the gauge");
+    let bound = if found.at_bound {
+        let (least, most) = EXPONENTS;
+        format!(", at the end of {least} to {most}: see that the widths follow the speed")
+    } else {
+        String::new()
+    };
+    say!("bead       width goes with speed to the power of -{:.3}{bound}", found.exponent);
+    say!("speed      {:.1} to {:.1} mm/s while it was laid", from.get(), to.get());
+    say!(
+        "widths     {} used, {} left out, {} frames refused; {:.2} % RMS off that bead",
+        found.used,
+        found.left_out,
+        print.refused,
+        100.0 * found.scatter
+    );
+    say!("gauge      {:.1} mm long", gauge.get());
+    tell(offset, sigma, now);
+}
