@@ -4,7 +4,8 @@
 //! The corners are taken to the plane of the board's face as a bead's edges are to the
 //! measured surface; the board, of its true size, is laid over them by least squares. It
 //! says where the place is that the nozzle touches, which the camera need not see. A
-//! plain board looks the same after half a turn, so there are two readings of it.
+//! plain board looks the same after half a turn, so there are two readings of it; one with
+//! markers has one.
 
 use nalgebra::{Point2, Vector2};
 
@@ -107,15 +108,14 @@ pub enum OffsetError {
     OffBed(&'static str),
     /// No reading.
     #[error(
-        "either way round, the board has {at} squares from its first corner on the far side of the \
-         gauge ({:.1} and {:.1} mm behind its middle): the nozzle is to lie {side}; see --nozzle-at \
-         and the cell's bead_axis",
-        -along_mm[0], -along_mm[1], at = at_text(.at), side = side_text(.ahead)
+        "the board has {at} squares from its first corner on the far side of the gauge ({}): the \
+         nozzle is to lie {side}; see --nozzle-at and the cell's bead_axis",
+        behind_text(*along_mm), at = at_text(.at), side = side_text(.ahead)
     )]
     Behind {
         /// Squares from the first corner that were told.
         at: [f64; 2],
-        /// Where that is along the axis \[mm\].
+        /// Where that is along the axis, and where the other way round \[mm\].
         along_mm: [f64; 2],
         /// Along the gauge's axis in the picture, towards the nozzle.
         ahead: Vector2<f64>,
@@ -139,6 +139,14 @@ fn at_text([x, y]: &[f64; 2]) -> String {
     format!("{x},{y}")
 }
 
+fn behind_text([one, other]: [f64; 2]) -> String {
+    if one.total_cmp(&other).is_eq() {
+        format!("{:.1} mm behind its middle", -one)
+    } else {
+        format!("{:.1} or, the other way round, {:.1} mm behind its middle", -one, -other)
+    }
+}
+
 fn side_text(ahead: &Vector2<f64>) -> &'static str {
     if ahead.y < 0.0 {
         "beyond the top of a vertical gauge"
@@ -159,19 +167,22 @@ pub fn find(
         return Err(OffsetError::NoCamera);
     }
     let (columns, rows) = board.corners();
-    if columns == rows {
+    if board.is_plain() && columns == rows {
         return Err(OffsetError::Square(columns));
     }
     let face = calibration.surface(touch.thickness, touch.robot_z);
     let lies = Lies::on(&face, board, corners).ok_or(OffsetError::OffBed("all of the board"))?;
     let axes =
         Axes::of(calibration, gauge).ok_or(OffsetError::OffBed("the middle of the gauge"))?;
-    let readings = [false, true].map(|turned| {
+    let read = |turned| {
         let nozzle = lies.place(board, touch.at, turned);
         (turned, axes.to(nozzle), nozzle)
-    });
+    };
+    let readings = [read(false), read(board.is_plain())];
     let along_mm = readings.map(|(_, place, _)| place.x);
-    let ahead: Vec<_> = readings.into_iter().filter(|(_, place, _)| place.x > 0.0).collect();
+    let count = if board.is_plain() { 2 } else { 1 };
+    let ahead: Vec<_> =
+        readings.into_iter().take(count).filter(|(_, place, _)| place.x > 0.0).collect();
     let (turned, place, nozzle) = match ahead[..] {
         [one] => one,
         [] => return Err(OffsetError::Behind { at: touch.at, along_mm, ahead: gauge.ahead }),

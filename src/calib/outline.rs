@@ -11,6 +11,9 @@ use crate::geometry::ImagePoint;
 const GOES_ON: f64 = 0.3;
 /// The same over the standard deviation of squares of one colour.
 const CLEARLY: f64 = 2.0;
+/// Scatter of squares of one colour, as a share of the same, from which on they are not
+/// plain.
+const UNEVEN: f64 = 0.15;
 /// Squares of a row that must lie in the picture for it to tell, if it has as many.
 const FEWEST: usize = 3;
 /// A square's colour is the mean of so many places along each of its sides, well
@@ -42,6 +45,9 @@ pub struct Outline {
     /// Beyond these there is no row of squares at all: what was taken for corners there
     /// are the ends of the board's squares, or none.
     pub ends_early: Vec<Side>,
+    /// Squares of one colour differ so much from each other that there may be something in
+    /// them.
+    pub is_uneven: bool,
 }
 
 /// Looks at the two rows of squares beyond each side; says nothing of a side where they
@@ -59,7 +65,8 @@ pub fn look(board: &Board, grey: &Grey<'_>, corners: &[ImagePoint]) -> Outline {
             [at(column, row), at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)];
         Some((column + row, colour(grey, square)?))
     });
-    let Some((contrast, _)) = difference(inner) else { return outline };
+    let Some((contrast, scatter)) = difference(inner) else { return outline };
+    outline.is_uneven = scatter > UNEVEN * contrast.abs();
     for side in Side::ALL {
         let line = |depth: usize, along: usize| match side {
             Side::FirstColumn => at(depth, along),

@@ -199,7 +199,10 @@ fn checkerboard(
         });
     };
     let corners = board.order(corners)?;
-    let Outline { goes_on, ends_early } = outline::look(board, grey, &corners);
+    let Outline { goes_on, ends_early, is_uneven } = outline::look(board, grey, &corners);
+    if is_uneven && charuco::shows(frame)? {
+        return Err(Refusal::Marked);
+    }
     if !ends_early.is_empty() {
         return Err(Refusal::Smaller { columns, rows, sides: ends_early });
     }

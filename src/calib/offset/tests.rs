@@ -1,11 +1,15 @@
 use nalgebra::{Point3, Rotation3, Vector3};
 
 use super::*;
+use crate::calib::board::Marks;
+use crate::calib::dictionary::Dictionary;
 use crate::calib::sighting::{self, Sighting};
 use crate::calib::{Camera, Quality};
+use crate::frame::{Frame, Pixels};
 use crate::geometry::Pose;
 use crate::sim::boards::{BoardStudio, Exposure};
 use crate::sim::hash;
+use crate::time::Stamp;
 
 const SIZE: [u32; 2] = [640, 480];
 const TILT: f64 = 0.2;
@@ -114,6 +118,36 @@ fn a_touch_that_is_certain_leaves_the_noise_of_the_corners() {
         assert!(found.first_corner.y < 240.0 && found.first_corner.x < 320.0, "{found:?}");
         assert!((found.parts.calibration.unwrap().get() - 0.085).abs() < 1e-3, "{found:?}");
     }
+}
+
+/// The nozzle hides a part of the board, and lies within it: what a plain board cannot
+/// tell.
+#[test]
+fn a_board_with_markers_has_one_reading_and_may_be_covered_in_part() {
+    let marks = Marks { side: Mm::constant(14.0), dictionary: Dictionary::Four };
+    let marked = board().with_marks(marks).unwrap();
+    let at = [4.0, 2.0];
+    let place = [MIDDLE[0] + RIGHT, MIDDLE[1] + 20.0];
+    let studio = BoardStudio::new(&camera(), SIZE);
+    let pose = lies(at, place, THICKNESS);
+    let frame = studio.take(&marked, &pose, Exposure::SHARP, 6).unwrap();
+    let nozzle = camera().project(pose.apply(Point3::new(80.0, 40.0, 0.0))).unwrap();
+    let bytes = frame.to_grey8();
+    let values = bytes.iter().enumerate().map(|(i, &grey)| {
+        #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+        let px = ImagePoint::new((i % 640) as f64, (i / 640) as f64);
+        if (px - nozzle).norm() < 45.0 { 70 } else { grey }
+    });
+    let covered = Frame::new(0, Stamp::START, (640, 480), Pixels::Grey8(values.collect())).unwrap();
+    let corners = sighting::look(&marked, "", &covered).unwrap().corners;
+    assert!((30..54).contains(&corners.len()), "{}", corners.len());
+    let touch = Touch { at, ..touch(0.0) };
+    let found = find(&calibration(), &gauge(), &marked, &corners, &touch).unwrap();
+    assert!((found.along_mm - 20.0).hypot(found.across_mm - RIGHT) < 0.05, "{found:?}");
+    // Behind the gauge is behind it, and not the other way round.
+    let behind = Gauge { ahead: Vector2::new(0.0, 1.0), ..gauge() };
+    let none = find(&calibration(), &behind, &marked, &corners, &touch).unwrap_err();
+    assert!(none.to_string().contains("of the gauge (20.0 mm behind its middle)"), "{none}");
 }
 
 #[test]
