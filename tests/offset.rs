@@ -121,7 +121,7 @@ fn a_board_under_the_nozzle_tells_the_offset() {
     assert!(answer.contains("± 0.50 mm") && answer.contains("has no offset_mm"), "{answer}");
     let aside = said(&mut offset(&picture, &with(&["--nozzle-at=-1,-1"])), 0);
     assert!(aside.contains("100.0") && aside.contains("WARNING"), "{aside}");
-    let both = said(&mut offset(&picture, &with(&["--nozzle-at", "4,2"])), 1);
+    let both = said(&mut offset(&picture, &with(&["--nozzle-at", "4,2.2"])), 1);
     assert!(both.contains("looks the same after half a turn"), "{both}");
     let missing = said(&mut offset(&picture, &["--cell", cell]), 2);
     assert!(missing.contains("needs --board") && missing.contains("--nozzle-at"), "{missing}");

@@ -12,7 +12,7 @@
 //! here. So widths are taken together over a gauge's length, and what is left of them is
 //! taken for independent noise on a course that wanders along the path, both as large as
 //! is likeliest. The squares are those of what each differs from what the ones before it
-//! foretell ([`whiten`]): a drift counts neither as many observations nor, where the
+//! foretell (`whiten`): a drift counts neither as many observations nor, where the
 //! controller follows it, as an answer of the bead to the speed (Ljung 1999, *System
 //! identification*, section 13.4, the direct approach). That is chosen over a bootstrap
 //! of blocks because a bead with a few steps of the speed has too few blocks, and over a
