@@ -46,18 +46,18 @@ pub struct AccuracyArgs {
     /// Frames of each set whose silently wrong widths are limited
     #[arg(long, value_name = "M", default_value = "30000", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     silent_frames: u64,
-    /// Only this set; may be given more than once
+    /// Only this set, or with --calibration only this camera; may be given more than once
     #[arg(long = "set", value_name = "NAME")]
     sets: Vec<String>,
     /// Calibrations instead of widths: whether widths scatter as much from one to the
     /// next as each foretells of itself
-    #[arg(long, conflicts_with = "sets")]
+    #[arg(long)]
     calibration: bool,
-    /// Calibrations of each camera from corners with noise
-    #[arg(long, value_name = "N", default_value = "2000", value_parser = clap::value_parser!(u64).range(2..=10_000_000))]
+    /// Calibrations of each camera from corners with noise; 0: none
+    #[arg(long, value_name = "N", default_value = "2000", value_parser = parse_trials)]
     trials: u64,
-    /// Calibrations of each camera from rendered pictures
-    #[arg(long, value_name = "N", default_value = "100", value_parser = clap::value_parser!(u64).range(2..=10_000_000))]
+    /// Calibrations of each camera from rendered pictures; 0: none
+    #[arg(long, value_name = "N", default_value = "100", value_parser = parse_trials)]
     rendered_trials: u64,
     /// Folder for accuracy.json and accuracy.md; for calibrations
     /// calibrations.json and calibrations.md
@@ -70,7 +70,7 @@ pub fn run(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
     if args.calibration {
         return judge_calibrations(args, voice);
     }
-    let sets = chosen(&args.sets)?;
+    let sets = chosen(&args.sets, sets::all(), |set| set.name)?;
     if let Some(out) = &args.out {
         output::make_folder(out)?;
     }
@@ -91,15 +91,24 @@ pub fn run(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
     Ok(if missed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
 
+/// A scatter takes two.
+fn parse_trials(text: &str) -> Result<u64, String> {
+    let count = text.trim().parse::<u64>().ok();
+    count
+        .filter(|count| *count != 1 && *count <= 10_000_000)
+        .ok_or_else(|| "expected 0 for none, or 2 to 10000000".to_owned())
+}
+
 fn judge_calibrations(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
+    let rigs =
+        chosen(&args.sets, calibrations::rigs().context("the rigs' boards")?, |rig| rig.name)?;
     if let Some(out) = &args.out {
         output::make_folder(out)?;
     }
-    let rigs = calibrations::rigs().context("the rigs' boards")?;
     let corners = rigs.iter().map(|rig| (rig, Source::Corners, args.trials));
     let rendered = rigs.iter().filter(|rig| rig.rendered);
     let pictures = rendered.map(|rig| (rig, Source::Pictures, args.rendered_trials));
-    let all: Vec<_> = corners.chain(pictures).collect();
+    let all: Vec<_> = corners.chain(pictures).filter(|(.., trials)| *trials > 0).collect();
     let total = all.iter().map(|(.., trials)| trials).sum();
     let progress = Mutex::new(Progress::new("calibrating", "trials", Some(total), voice.quiet));
     let figures: Vec<RigFigures> = all
@@ -130,15 +139,14 @@ fn judge_rig(rig: &Rig, source: Source, trials: u64, progress: &Mutex<Progress>)
     RigFigures::of(rig, source, &outcomes)
 }
 
-/// The named sets, or all.
-fn chosen(names: &[String]) -> Result<Vec<Set>> {
-    let all = sets::all();
-    if let Some(unknown) = names.iter().find(|name| all.iter().all(|set| set.name != **name)) {
-        let known: Vec<&str> = all.iter().map(|set| set.name).collect();
+/// Those that were named, or all.
+fn chosen<T>(names: &[String], all: Vec<T>, name_of: impl Fn(&T) -> &str) -> Result<Vec<T>> {
+    if let Some(unknown) = names.iter().find(|name| all.iter().all(|one| name_of(one) != **name)) {
+        let known: Vec<&str> = all.iter().map(&name_of).collect();
         let what = format!("--set {unknown}: there is none; one of {}", known.join(", "));
         return Err(WrongArguments::new(what).into());
     }
-    let wanted = |set: &Set| names.is_empty() || names.iter().any(|name| name == set.name);
+    let wanted = |one: &T| names.is_empty() || names.iter().any(|name| name == name_of(one));
     Ok(all.into_iter().filter(wanted).collect())
 }
 
