@@ -121,8 +121,8 @@ fn a_board_under_the_nozzle_tells_the_offset() {
     assert!(answer.contains("± 0.50 mm") && answer.contains("has no offset_mm"), "{answer}");
     let aside = said(&mut offset(&picture, &with(&["--nozzle-at=-1,-1"])), 0);
     assert!(aside.contains("100.0") && aside.contains("WARNING"), "{aside}");
-    let both = said(&mut offset(&picture, &with(&["--nozzle-at", "4,2.2"])), 1);
-    assert!(both.contains("looks the same after half a turn"), "{both}");
+    let behind = said(&mut offset(&picture, &with(&["--nozzle-at", "4,5"])), 1);
+    assert!(behind.contains("on the far side of the gauge (40.0 mm behind"), "{behind}");
     let missing = said(&mut offset(&picture, &["--cell", cell]), 2);
     assert!(missing.contains("needs --board") && missing.contains("--nozzle-at"), "{missing}");
     let of_recording = with(&["--nozzle-at", "4,-1", "--max-mm", "300"]);

@@ -17,7 +17,7 @@ const NEIGHBOURHOODS_PX: [i32; 4] = [11, 23, 47, 95];
 /// Grey levels that dark is darker than the mean.
 const DARKER: f64 = 7.0;
 /// Least circumference of a quadrilateral \[px\].
-const LEAST_ROUND_PX: f64 = 28.0;
+const LEAST_ROUND_PX: f64 = 36.0;
 /// Least area over that of a square with the same circumference.
 const LEAST_FULL: f64 = 0.25;
 /// How far an outline may be off straight sides, as a share of its length.

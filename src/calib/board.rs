@@ -139,9 +139,15 @@ impl Board {
         self.marks
     }
 
-    /// Whether it looks the same after half a turn, or counted from its other end.
+    /// Whether it has no markers.
     pub fn is_plain(&self) -> bool {
         self.marks.is_none()
+    }
+
+    /// Whether it looks the same after half a turn: without markers, and with the same
+    /// colour in opposite corners. Of others the square in the first corner is black.
+    pub fn is_symmetric(&self) -> bool {
+        self.is_plain() && (self.columns + self.rows).is_multiple_of(2)
     }
 
     /// The black cells of the marker in a square, counted from the upper left one, with

@@ -17,6 +17,8 @@ use crate::vision::rank;
 const OFF: f64 = 0.3;
 /// Pairs of markers from which the board's plane is guessed.
 const MOST_PAIRS: usize = 400;
+/// The same where many counts of columns are tried.
+const FEW_PAIRS: usize = 60;
 /// Markers beside a place from which the picture of the place is foretold: few, so that
 /// the lens does not bend what lies between them.
 const NEIGHBOURS: usize = 4;
@@ -218,7 +220,7 @@ fn among(
     let (fitting, layout) = [false, true]
         .map(|first| {
             let layout = Layout::of(board, first);
-            (fitting(&layout, &markers, clear), layout)
+            (fitting(&layout, &markers, clear, MOST_PAIRS), layout)
         })
         .into_iter()
         .reduce(|a, b| if b.0.len() > a.0.len() { b } else { a })
@@ -248,19 +250,21 @@ fn percent(share: f64) -> u32 {
     (100.0 * share).round().clamp(0.0, 1e6) as u32
 }
 
-/// The markers that lie on one board: the most that two of them agree on, and those
-/// that fit their neighbours.
-fn fitting(layout: &Layout, markers: &[Marker], clear: f64) -> Vec<Placed> {
+/// The markers that lie on one board: the most that two of them agree on, of so many
+/// pairs, and those that fit their neighbours.
+fn fitting(layout: &Layout, markers: &[Marker], clear: f64, most_pairs: usize) -> Vec<Placed> {
     let placed: Vec<Placed> = markers
         .iter()
         .filter_map(|&marker| {
             Some(Placed { on_board: layout.corners(marker.number, clear)?, marker })
         })
         .collect();
-    let pairs = (0..placed.len()).flat_map(|i| (i + 1..placed.len()).map(move |j| (i, j)));
+    // By their distance in the list, so that none is in most of the pairs.
+    let count = placed.len();
+    let pairs = (1..count).flat_map(|apart| (0..count - apart).map(move |i| (i, i + apart)));
     let fits = |map: &Matrix3<f64>, placed: &Placed| placed.off(map, clear) < OFF;
     let best = pairs
-        .take(MOST_PAIRS)
+        .take(most_pairs)
         .filter_map(|(i, j)| map_of([&placed[i], &placed[j]].into_iter()))
         .map(|map| placed.iter().map(|marker| fits(&map, marker)).collect::<Vec<bool>>())
         .max_by_key(|fits| fits.iter().filter(|&&fit| fit).count());
@@ -384,7 +388,7 @@ fn columns_of(markers: &[Marker], clear: f64) -> Option<usize> {
     let fits = |columns: usize| {
         let both = [false, true].map(|first_has_marker| {
             let layout = Layout { columns: columns + 1, rows: usize::MAX, first_has_marker };
-            fitting(&layout, markers, clear).len()
+            fitting(&layout, markers, clear, FEW_PAIRS).len()
         });
         both[0].max(both[1])
     };

@@ -61,7 +61,8 @@ pub(super) fn best(views: &Views) -> Option<(Fit, Free, Vec<Trial>)> {
     if let Some((trial, bent)) = bent {
         trials.push(trial);
         let foretells = trial.held_out_px.zip(chosen.held_out_px).is_some_and(|(b, f)| b < f);
-        if foretells && is_bent(views, &bent, free) {
+        let is_sound = chosen.folds || !trial.folds;
+        if foretells && is_sound && is_bent(views, &bent, free) {
             return Some((bent, free, trials));
         }
     }
@@ -81,7 +82,8 @@ fn chosen(fits: &[(Fit, Trial)]) -> Option<usize> {
         let most = if is_rational(&fit.1) { 1.0 - AS_GOOD } else { 1.0 + AS_GOOD };
         held_out(fit).is_some_and(|px| px <= most * least)
     };
-    fits.iter().rposition(is_as_good).or_else(|| (!fits.is_empty()).then_some(0))
+    let simplest = || fits.iter().position(|(_, trial)| all_fold || !trial.folds);
+    fits.iter().rposition(is_as_good).or_else(simplest)
 }
 
 /// A fit with a lens that is given, by way of the simpler ones.

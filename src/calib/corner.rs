@@ -122,13 +122,11 @@ impl Line {
         corner: impl Fn(usize) -> Option<ImagePoint>,
     ) -> Option<Self> {
         let middle = at.clamp(1, count - 2);
-        let next = || Some(corner(at + 1).filter(|_| at + 1 < count)? - corner(at)?);
+        let next = || (at + 1 < count).then(|| Some(corner(at + 1)? - corner(at)?)).flatten();
         let last = || Some(corner(at)? - corner(at.checked_sub(1)?)?);
         let three = corner(middle - 1).zip(corner(middle)).zip(corner(middle + 1));
         let Some(((before, between), after)) = three else {
-            let beyond = |at: usize| at < count;
-            let side = if beyond(at + 1) { next().or_else(last) } else { last() };
-            return Some(Self { side: side?, bend: 0.0 });
+            return Some(Self { side: next().or_else(last)?, bend: 0.0 });
         };
         let across = (after - before) / 2.0;
         let second = before.coords + after.coords - between.coords * 2.0;

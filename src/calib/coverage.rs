@@ -8,7 +8,7 @@ use super::solve::{Solution, View};
 /// The picture is cut into this many parts along each side.
 pub const GRID: usize = 4;
 /// All of its parts.
-pub const CELLS: usize = GRID * GRID;
+pub const PARTS: usize = GRID * GRID;
 /// Tilt about an axis of the picture from which on it counts \[degrees\].
 const TILTED_DEG: f64 = 10.0;
 

@@ -128,7 +128,8 @@ mod tests {
 
         #[test]
         fn no_text_makes_it_panic(text in "[ \\-\\[\\]{}:,&*!%|>\"'#\n\tkKdD0-9.eE]{0,80}") {
-            prop_assert!(parse("x", &text).is_err());
+            let wrong = parse("x", &text).unwrap_err();
+            prop_assert!(!wrong.to_string().contains(": 0 problems"), "{wrong}");
         }
     }
 
@@ -140,6 +141,12 @@ mod tests {
         assert!(said("a: [1, 2\nb: 3\n").contains("not YAML"), "{}", said("a: [1, 2\nb: 3\n"));
         let toml = said("a = 1\n\nb = 2\n");
         assert!(toml.contains("found a = 1 b = 2, expected a mapping"), "{toml}");
+        assert!(said("{}").contains("expected a mapping with the keys"), "{}", said("{}"));
+        let sides = said(
+            &opencv::to_yaml(&intrinsics([1.0; crate::calib::camera::NUMBERS]))
+                .replace("rows: 3", "rows: x"),
+        );
+        assert!(sides.contains("camera_matrix.rows: found x, expected a whole number"), "{sides}");
         let other = said("name: printer\nspeed: 3\n");
         for key in ["camera_matrix: found nothing", "distortion_coefficients: found nothing"] {
             assert!(other.contains(key), "{other}");

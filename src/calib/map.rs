@@ -60,6 +60,13 @@ impl WidthMap {
     }
 }
 
+/// The largest of several maps, where boards were seen \[mm\]; `None` where one of them
+/// does not tell.
+pub fn worst_mm(maps: &[WidthMap]) -> Option<f64> {
+    let worst = maps.iter().map(|map| map.worst_where_seen_mm);
+    worst.reduce(|a, b| Some(a?.max(b?))).flatten()
+}
+
 /// Ends of beads of a width that lie where boards were seen: those by which
 /// [`WidthMap::worst_where_seen_mm`] is told.
 pub fn where_seen(

@@ -4,8 +4,8 @@
 //! The corners are taken to the plane of the board's face as a bead's edges are to the
 //! measured surface; the board, of its true size, is laid over them by least squares. It
 //! says where the place is that the nozzle touches, which the camera need not see. A
-//! plain board looks the same after half a turn, so there are two readings of it; one with
-//! markers has one.
+//! plain board whose opposite corners have the same colour looks the same after half a
+//! turn, so there are two readings of it.
 
 use nalgebra::{Point2, Vector2};
 
@@ -167,7 +167,7 @@ pub fn find(
         return Err(OffsetError::NoCamera);
     }
     let (columns, rows) = board.corners();
-    if board.is_plain() && columns == rows {
+    if board.is_symmetric() && columns == rows {
         return Err(OffsetError::Square(columns));
     }
     let face = calibration.surface(touch.thickness, touch.robot_z);
@@ -178,9 +178,9 @@ pub fn find(
         let nozzle = lies.place(board, touch.at, turned);
         (turned, axes.to(nozzle), nozzle)
     };
-    let readings = [read(false), read(board.is_plain())];
+    let readings = [read(false), read(board.is_symmetric())];
     let along_mm = readings.map(|(_, place, _)| place.x);
-    let count = if board.is_plain() { 2 } else { 1 };
+    let count = if board.is_symmetric() { 2 } else { 1 };
     let ahead: Vec<_> =
         readings.into_iter().take(count).filter(|(_, place, _)| place.x > 0.0).collect();
     let (turned, place, nozzle) = match ahead[..] {

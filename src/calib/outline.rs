@@ -48,6 +48,9 @@ pub struct Outline {
     /// Squares of one colour differ so much from each other that there may be something in
     /// them.
     pub is_uneven: bool,
+    /// The first of the squares within is bright: on a board whose opposite corners have
+    /// two colours the corners were counted from the wrong end.
+    pub is_first_bright: bool,
 }
 
 /// Looks at the two rows of squares beyond each side; says nothing of a side where they
@@ -67,6 +70,7 @@ pub fn look(board: &Board, grey: &Grey<'_>, corners: &[ImagePoint]) -> Outline {
     });
     let Some((contrast, scatter)) = difference(inner) else { return outline };
     outline.is_uneven = scatter > UNEVEN * contrast.abs();
+    outline.is_first_bright = contrast > 0.0;
     for side in Side::ALL {
         let line = |depth: usize, along: usize| match side {
             Side::FirstColumn => at(depth, along),

@@ -4,7 +4,7 @@
 
 use nalgebra::Vector3;
 
-use super::coverage::{CELLS, Coverage};
+use super::coverage::{Coverage, PARTS};
 use super::solve::{Solution, View};
 use crate::vision::rank;
 
@@ -19,7 +19,7 @@ pub enum Doubt {
     },
     /// Parts of the picture were never seen with a board.
     #[error(
-        "the boards cover {covered} of {CELLS} parts of the picture; distortion is a guess in \
+        "the boards cover {covered} of {PARTS} parts of the picture; distortion is a guess in \
          the others, so bring the board into the corners too"
     )]
     Coverage {

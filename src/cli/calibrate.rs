@@ -25,7 +25,7 @@ use crate::io::whole_file::write_whole;
 use crate::time::Stamp;
 use crate::units::Mm;
 
-/// Finds camera, lens and bed plane from a folder of checkerboard images.
+/// Finds camera, lens and bed plane from images of a board, in a folder or taken now.
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
 Example:
@@ -45,7 +45,7 @@ takes the pictures, too: first of the board lying on the bed, then of every
 place in which it is held, and ends when the width of the bead is known as well
 as was asked for.")]
 pub struct CalibrateArgs {
-    /// Folder of checkerboard images
+    /// Folder of images of a board
     #[arg(required_unless_present = "camera", conflicts_with = "camera")]
     input: Option<PathBuf>,
     /// Take the pictures now, with this camera, as a cell names it: camera:0,
@@ -183,7 +183,7 @@ pub(super) struct Pictures {
 /// without writing anything where no calibration can be found.
 pub fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     let board = args.board.board()?;
-    check_lengths(args)?;
+    check_arguments(args)?;
     let pictures = match &args.input {
         Some(folder) => look_into(args, &board, folder)?,
         None => live::take(args, &board)?,
@@ -217,7 +217,7 @@ impl CalibrateArgs {
     }
 }
 
-fn check_lengths(args: &CalibrateArgs) -> Result<(), WrongArguments> {
+fn check_arguments(args: &CalibrateArgs) -> Result<(), WrongArguments> {
     let report = args.report();
     if report == args.out {
         let what = format!("--out and --report are both {}: name two files", report.display());

@@ -70,7 +70,11 @@ pub struct OffsetArgs {
 
 /// The board, if one was told: a recording needs none.
 #[derive(Debug)]
-struct Told(Option<BoardArgs>);
+struct Told {
+    board: Option<BoardArgs>,
+    /// A part of one, without its counts.
+    is_part: bool,
+}
 
 impl Args for Told {
     fn augment_args(command: Command) -> Command {
@@ -86,7 +90,9 @@ impl Args for Told {
 impl FromArgMatches for Told {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         let is_told = matches.contains_id("board");
-        is_told.then(|| BoardArgs::from_arg_matches(matches)).transpose().map(Self)
+        let board = is_told.then(|| BoardArgs::from_arg_matches(matches)).transpose()?;
+        let is_part = ["square_mm", "marker_mm"].iter().any(|part| matches.contains_id(part));
+        Ok(Self { board, is_part: is_part && !is_told })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
@@ -115,9 +121,10 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<ExitCode> {
 }
 
 impl OffsetArgs {
-    fn of_picture(&self) -> [(&'static str, bool); 5] {
+    fn of_picture(&self) -> [(&'static str, bool); 6] {
         [
-            ("--board", self.board.0.is_some()),
+            ("--board", self.board.board.is_some()),
+            ("--square-mm or --marker-mm", self.board.is_part),
             ("--nozzle-at", self.nozzle_at.is_some()),
             ("--touch-sigma-mm", self.touch_sigma_mm.is_some()),
             ("--board-thickness-mm", self.board_thickness_mm.is_some()),

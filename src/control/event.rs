@@ -78,6 +78,13 @@ pub enum RobotMode {
     Fault,
 }
 
+impl RobotMode {
+    /// Whether bead is laid.
+    pub fn lays_bead(self) -> bool {
+        matches!(self, Self::Print | Self::Hold)
+    }
+}
+
 /// One `STATE` of the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RobotState {

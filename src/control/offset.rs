@@ -114,8 +114,8 @@ pub enum OffsetError {
     NoPath,
     /// Too few widths.
     #[error(
-        "{found} widths were measured while bead was laid, and {FEWEST} are needed: record longer, \
-         or see why frames were refused (`truebead process`)"
+        "{found} widths are of bead that was laid while the speed is known, and {FEWEST} are needed: \
+         record longer, or see why frames were refused (`truebead process`)"
     )]
     TooFew {
         /// Widths that could be used.
@@ -264,6 +264,10 @@ fn settle(
     loop {
         let data = Data::of(course, &used, exponent, search.gauge);
         let profile = Profile::new(data, noise);
+        if profile.pieces() < FEWEST_PIECES {
+            let (gauge, pieces) = (search.gauge, profile.pieces());
+            return Err(OffsetError::TooShort { gauge, pieces });
+        }
         let best = profile.best(search.farthest.get());
         if profile.gain(&best) < LEAST_GAIN {
             return Err(OffsetError::NotFollowing { from, to, farthest: search.farthest });
@@ -272,10 +276,6 @@ fn settle(
         let next = profile::those_that_count(course, looks, search.gauge, &best, likeliest);
         if next.len() < FEWEST {
             return Err(OffsetError::TooFew { found: next.len() });
-        }
-        if profile.pieces() < FEWEST_PIECES {
-            let (gauge, pieces) = (search.gauge, profile.pieces());
-            return Err(OffsetError::TooShort { gauge, pieces });
         }
         let settled = (best.offset_mm - before_mm).abs() < SETTLED_MM
             && likeliest == noise

@@ -7,6 +7,9 @@ use crate::calib::exchange::{self, Import};
 use crate::calib::{Calibration, file};
 use crate::config::Problems;
 
+/// Bytes of a camera in the YAML of others, at most.
+const LONGEST_YAML: u64 = 1_000_000;
+
 /// A calibration file that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationFileError {
@@ -42,9 +45,19 @@ pub fn read(path: &Path) -> Result<Calibration, CalibrationFileError> {
 /// Reads a camera from the YAML of ROS or OpenCV; everything that is wrong with it is
 /// reported at once.
 pub fn read_exchanged(path: &Path) -> Result<Import, CalibrationFileError> {
-    let text = fs::read_to_string(path)
+    let text = read_text(path)
         .map_err(|source| CalibrationFileError::ReadYaml { path: path.to_owned(), source })?;
     Ok(exchange::parse(&path.display().to_string(), &text)?)
+}
+
+/// A camera is a page of text; whatever is much longer is something else.
+fn read_text(path: &Path) -> io::Result<String> {
+    let length = fs::metadata(path)?.len();
+    if length > LONGEST_YAML {
+        let what = format!("{length} bytes are no camera's calibration");
+        return Err(io::Error::new(io::ErrorKind::InvalidData, what));
+    }
+    fs::read_to_string(path)
 }
 
 #[cfg(test)]

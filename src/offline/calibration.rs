@@ -8,7 +8,7 @@ use maud::{Markup, html};
 use self::drawing::{Drawing, residuals, width_map};
 use super::report::reloading_page;
 use crate::calib::board::Board;
-use crate::calib::map::WidthMap;
+use crate::calib::map::{self, WidthMap};
 use crate::calib::next_view::NextView;
 use crate::calib::quality;
 use crate::calib::sighting::Looks;
@@ -75,8 +75,7 @@ impl Page<'_> {
 
     fn verdict(&self) -> Markup {
         let doubts = quality::doubts(self.solution);
-        let worst = self.maps.iter().map(|map| map.worst_where_seen_mm);
-        let worst = worst.reduce(|a, b| Some(a?.max(b?))).flatten();
+        let worst = map::worst_mm(self.maps);
         let fails = self.limit_mm.is_some_and(|limit| worst.is_none_or(|worst| worst > limit));
         let (class, word) = match (fails, worst, doubts.is_empty()) {
             (true, ..) | (_, None, _) => ("bad", "Not good enough."),

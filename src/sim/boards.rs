@@ -268,11 +268,8 @@ mod tests {
                 .iter()
                 .map(|p| CAMERA.project(pose.apply(*p)).unwrap())
                 .collect();
-            let turned = (truth[0] - found[0]).norm() > 20.0;
-            let pairs = found.iter().enumerate();
-            squares += pairs
-                .map(|(i, at)| (at - truth[if turned { 53 - i } else { i }]).norm_squared())
-                .sum::<f64>();
+            let pairs = found.iter().zip(&truth);
+            squares += pairs.map(|(found, truth)| (found - truth).norm_squared()).sum::<f64>();
         }
         let rms = (squares / (6.0 * 54.0)).sqrt();
         println!("{rms}");

@@ -165,9 +165,7 @@ impl Bench {
         let rig = &self.rig;
         if let Some(studio) = &self.studio {
             let frame = studio.take(&rig.board, pose, Exposure::SHARP, seed).ok()?;
-            let mut sighting = sighting::look(&rig.board, "", &frame).ok()?;
-            turn_to(&mut sighting, rig.camera.project(pose.apply(Point3::origin()))?);
-            return Some(sighting);
+            return sighting::look(&rig.board, "", &frame).ok();
         }
         let corners = rig.board.corners_mm().into_iter().zip(0..).map(|(corner, i)| {
             let [x, y] = hash::normal_pair(hash::mix(&[seed, i]));
@@ -202,20 +200,6 @@ impl Bench {
         let end =
             |by: f64| map.to_px(crate::geometry::SurfacePoint::new(middle[0] + by, middle[1]));
         Some(([end(-half)?, end(half)?], 2.0 * half))
-    }
-}
-
-/// Counts a plain board from the corner nearest to where its origin is.
-fn turn_to(sighting: &mut Sighting, origin: ImagePoint) {
-    let ends = (sighting.corners.first(), sighting.corners.last());
-    if let (Some(first), Some(last)) = ends
-        && (last.px - origin).norm() < (first.px - origin).norm()
-    {
-        let count = sighting.corners.len();
-        sighting.corners.reverse();
-        for (corner, index) in sighting.corners.iter_mut().zip(0..count) {
-            corner.index = index;
-        }
     }
 }
 

@@ -33,7 +33,7 @@ impl<'a> Fields<'a> {
     pub fn of(root: &'a Node) -> Self {
         let items = mapping(root);
         let fields = Self { items: items.unwrap_or(&[]), problems: RefCell::default() };
-        if items.is_none() {
+        if items.is_none_or(<[_]>::is_empty) {
             let expected = "a mapping with the keys of ROS's camera_info or OpenCV's calibration";
             fields.problem(Some(root.line), "", root.shown(), expected);
         }
@@ -177,6 +177,16 @@ impl<'a> Fields<'a> {
                     &format!("{key}.{part}"),
                     "nothing",
                     "it beside the others",
+                );
+            }
+        }
+        for (part, side) in [("rows", sides[0]), ("cols", sides[1])] {
+            if let Some(side) = side.filter(|side| number(side).is_none()) {
+                self.problem(
+                    Some(side.line),
+                    &format!("{key}.{part}"),
+                    side.shown(),
+                    "a whole number",
                 );
             }
         }

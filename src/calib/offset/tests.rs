@@ -200,16 +200,22 @@ fn the_nozzle_is_beyond_the_right_end_of_a_horizontal_gauge() {
 
 #[test]
 fn what_has_no_one_answer_is_refused() {
-    let corners = seen([0.0; 2], THICKNESS, 4).corners;
+    // Its opposite corners have one colour.
+    let even = Board::new(8, 6, Mm::constant(20.0)).unwrap();
+    let place = [MIDDLE[0] + RIGHT, MIDDLE[1] + AHEAD];
+    let studio = BoardStudio::new(&camera(), SIZE);
+    let pose = lies(AT, place, THICKNESS);
+    let frame = studio.take(&even, &pose, Exposure::SHARP, 4).unwrap();
+    let corners = sighting::look(&even, "", &frame).unwrap().corners;
     let asked = |gauge: &Gauge, at| {
         let touch = Touch { at, ..touch(0.5) };
-        find(&calibration(), gauge, &board(), &corners, &touch).map(|found| found.along_mm)
+        find(&calibration(), gauge, &even, &corners, &touch).map(|found| found.along_mm)
     };
     // The board's middle, and a little beside it, is ahead of the gauge's either way.
-    let both = asked(&gauge(), [4.0, 2.0]);
+    let both = asked(&gauge(), [3.5, 2.0]);
     assert!(matches!(both, Err(OffsetError::Ambiguous { .. })), "{both:?}");
     let behind = Gauge { ahead: Vector2::new(0.0, 1.0), ..gauge() };
-    let none = asked(&behind, [4.0, 2.0]);
+    let none = asked(&behind, [3.5, 2.0]);
     assert!(matches!(none, Err(OffsetError::Behind { .. })), "{none:?}");
     let square = Board::new(6, 6, Mm::constant(20.0)).unwrap();
     let few = &corners[..36];

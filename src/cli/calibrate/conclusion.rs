@@ -88,8 +88,7 @@ impl<'a> Conclusion<'a> {
     /// The largest standard deviation of the bead's width where boards were seen \[mm\], at
     /// any of the heights; `None` where that cannot be told.
     pub fn worst_mm(&self) -> Option<f64> {
-        let worst = self.maps.iter().map(|map| map.worst_where_seen_mm);
-        worst.reduce(|a, b| Some(a?.max(b?))).flatten()
+        map::worst_mm(&self.maps)
     }
 
     /// Whether a width is known less well than it must be.

@@ -12,7 +12,7 @@ use super::conclusion::{Conclusion, taken};
 use super::{CalibrateArgs, Pictures, WrongArguments};
 use crate::calib::board::Board;
 use crate::calib::collect::{Collector, News};
-use crate::calib::coverage::{CELLS, Coverage, SIDES};
+use crate::calib::coverage::{Coverage, PARTS, SIDES};
 use crate::calib::quality;
 use crate::calib::sighting;
 use crate::calib::solve::FEWEST_VIEWS;
@@ -34,7 +34,8 @@ const MOST_VIEWS: usize = 60;
 const RELOAD_S: u32 = 3;
 
 /// Takes pictures until the width of the bead is known as well as was asked for, a
-/// further picture brings nothing, the camera ends, or the user ends it.
+/// further picture brings nothing, there are [`MOST_VIEWS`], the camera ends, or the user
+/// ends it.
 pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<Pictures> {
     let name = args.camera.as_deref().unwrap_or_default();
     let source = source(name)?;
@@ -48,9 +49,10 @@ pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<Pictures> {
         channel: Channel::Grey,
     };
     let mut camera = open::live(options, RunClock::start(), stop.told().clone())?;
+    let is_folder_new = !folder.exists();
     std::fs::create_dir_all(&folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    let mut taking = Taking::new(args, board, folder);
+    let mut taking = Taking::new(args, board, (folder, is_folder_new));
     taking.run(camera.as_mut(), &stop)?;
     taking.finish()
 }
@@ -94,15 +96,27 @@ struct Taking<'a> {
     args: &'a CalibrateArgs,
     board: &'a Board,
     folder: PathBuf,
+    is_folder_new: bool,
     collector: Collector,
     files: Vec<PathBuf>,
     screen: Screen,
 }
 
 impl<'a> Taking<'a> {
-    fn new(args: &'a CalibrateArgs, board: &'a Board, folder: PathBuf) -> Self {
-        let collector = Collector::new(*board);
-        Self { args, board, folder, collector, files: Vec::new(), screen: Screen::new() }
+    fn new(
+        args: &'a CalibrateArgs,
+        board: &'a Board,
+        (folder, is_folder_new): (PathBuf, bool),
+    ) -> Self {
+        Self {
+            args,
+            board,
+            folder,
+            is_folder_new,
+            collector: Collector::new(*board),
+            files: Vec::new(),
+            screen: Screen::new(),
+        }
     }
 
     fn run(&mut self, camera: &mut dyn FrameSource, stop: &StopSignal) -> anyhow::Result<()> {
@@ -194,12 +208,14 @@ impl<'a> Taking<'a> {
     fn finish(self) -> anyhow::Result<Pictures> {
         self.screen.end();
         if self.files.is_empty() {
-            // Nothing was put into it.
-            let _ = std::fs::remove_dir(&self.folder);
+            if self.is_folder_new {
+                // Nothing was put into it.
+                let _ = std::fs::remove_dir(&self.folder);
+            }
             bail!("the camera has not shown the board lying still on the bed; nothing was written");
         }
         let pictures = taken(&self.files, self.collector.kept());
-        println!("{} pictures in {}\n", self.files.len(), self.folder.display());
+        say!("{} pictures in {}\n", self.files.len(), self.folder.display());
         Ok(pictures)
     }
 }
@@ -233,7 +249,7 @@ fn progress(args: &CalibrateArgs, conclusion: &Conclusion<'_>) -> String {
         format!("; missing: {}", missing.join(", "))
     };
     let beside = [
-        format!("boards in {} of {CELLS} parts of the picture", coverage.count()),
+        format!("boards in {} of {PARTS} parts of the picture", coverage.count()),
         format!("side that was nearer: {}{missing}", tilts.collect::<Vec<_>>().join(", ")),
         conclusion
             .next

@@ -6,6 +6,7 @@ use anyhow::{Context, bail};
 
 use super::{CalibrateArgs, Pictures, WrongArguments, check_size, look_at};
 use crate::calib::board::{Board, Seen};
+use crate::calib::charuco::NoMarkers;
 use crate::calib::equations::{Corner, Model};
 use crate::calib::plane::OnBed;
 use crate::calib::sighting::{Looks, Refusal, is_same_place};
@@ -161,7 +162,12 @@ fn last_seen<'a>(solution: &'a Solution, looks: &'a Looks) -> Option<(&'a str, V
                 return Some((name, later));
             }
             Err(Refusal::Duplicate { of, .. }) => return Some((of, later)),
-            Ok(_) | Err(Refusal::Unreadable(_) | Refusal::NoBoard { .. }) => {}
+            Ok(_)
+            | Err(
+                Refusal::Unreadable(_)
+                | Refusal::NoBoard { .. }
+                | Refusal::NoMarkers(NoMarkers::None { .. }),
+            ) => {}
             Err(_) => later.push(name.clone()),
         }
     }
@@ -190,7 +196,7 @@ fn on_bed(
             // A board that is in one place twice still lies on the bed.
             Err(Refusal::Duplicate { .. }) => looked_for(file, board, solution.image_size_px),
             Err(refusal) => {
-                bail!("--plane {name}: {refusal}; name an image that shows the whole board")
+                bail!("--plane {name}: {refusal}; name an image that shows the board")
             }
         };
     }

@@ -8,7 +8,7 @@ use super::plane::Plane;
 use crate::calib::Calibration;
 use crate::calib::camera::NUMBERS;
 use crate::calib::covariance::Covariance;
-use crate::calib::map::WidthMap;
+use crate::calib::map::{self, WidthMap};
 use crate::calib::next_view::NextView;
 use crate::calib::quality;
 use crate::calib::scale::single_scale;
@@ -181,9 +181,11 @@ pub fn width(
         line!(out, "  degrees to several sides");
         return out;
     };
-    let bead = maps.first().map_or_else(String::new, |map| {
-        format!(" ({:.4} mm in {} mm)", share * map.bead_mm, map.bead_mm)
-    });
+    let told = maps.first().filter(|_| map::worst_mm(maps).is_some());
+    let bead = told.map_or_else(
+        || " of a bead that fills a third of where boards were seen,".to_owned(),
+        |map| format!(" ({:.4} mm in {} mm)", share * map.bead_mm, map.bead_mm),
+    );
     line!(out, "\na width is known to {:.3} %{bead} where boards were seen,", 100.0 * share);
     line!(out, "  as far as the corners' noise tells; sigma_mm of each width contains it");
     let [from, to] = covariance.seen_px();
@@ -223,8 +225,7 @@ pub fn maps(maps: &[WidthMap], limit: Option<Mm>) -> String {
         );
     }
     if let Some(limit) = limit {
-        let worst = maps.iter().map(|map| map.worst_where_seen_mm);
-        match worst.reduce(|a, b| Some(a?.max(b?))).flatten() {
+        match map::worst_mm(maps) {
             None => line!(out, "  FAIL: such a bead is not seen whole where boards were seen"),
             Some(mm) if mm > limit.get() => {
                 line!(out, "  FAIL: {mm:.4} mm where boards were seen, more than {limit}");

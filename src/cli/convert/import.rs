@@ -30,6 +30,13 @@ pub fn text(
     let plane = bed_plane(args, &board, &import.intrinsics)?;
     say(&report::plane(&plane));
     let Intrinsics { image_size_px, camera, .. } = &import.intrinsics;
+    if let Some(px) = camera.fold(*image_size_px) {
+        notes.push(format!(
+            "the lens model turns over before pixel ({:.0}, {:.0}), and nothing can be measured there; \
+             calibrate with pictures of a board in the corners of the picture",
+            px.x, px.y
+        ));
+    }
     let reprojection_rms_px = plane.on_bed.rms_px;
     let quality =
         Quality { reprojection_rms_px, width_sigma_share: None, seen_px: None, heights_mm: None };

@@ -1,10 +1,10 @@
 //! From a picture of a board that the nozzle touches.
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use nalgebra::Vector2;
 
 use super::super::WrongArguments;
-use super::super::calibrate::look_at;
+use super::super::calibrate::{check_size, look_at};
 use super::super::cell::LoadedCell;
 use super::{OffsetArgs, tell};
 use crate::calib::offset::{Found, Gauge, OffsetError, Touch, find};
@@ -26,12 +26,13 @@ const FLAT_MM: f64 = 0.5;
 pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     let needed = [
         ("--cell CELL.toml", args.cell.is_some()),
-        ("--board COLUMNSxROWS with --square-mm", args.board.0.is_some()),
+        ("--board COLUMNSxROWS with --square-mm", args.board.board.is_some()),
         ("--nozzle-at X,Y", args.nozzle_at.is_some()),
     ];
     let missing: Vec<&str> =
         needed.iter().filter(|(_, given)| !given).map(|(name, _)| *name).collect();
-    let (Some(cell), Some(board), Some(at)) = (&args.cell, &args.board.0, args.nozzle_at) else {
+    let (Some(cell), Some(board), Some(at)) = (&args.cell, &args.board.board, args.nozzle_at)
+    else {
         let what = format!(
             "{}: a picture (no recording) needs {} besides",
             args.input.display(),
@@ -48,14 +49,14 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     };
     let name = args.input.display().to_string();
     let sighting = look_at(&board, &name, &args.input).with_context(|| name.clone())?;
-    if sighting.image_size_px != expected {
-        let ([width, height], [right, bottom]) = (sighting.image_size_px, expected);
-        bail!("{name}: {width}x{height} px, but the calibration is for {right}x{bottom} px");
+    check_size(&sighting, expected)?;
+    if touch.robot_z.is_some() && loaded.cell.mount == Some(Mount::Fixed) {
+        let what = format!(
+            "--robot-z-mm: the camera of {} is fixed, and does not rise with the robot; leave it out",
+            cell.display()
+        );
+        return Err(WrongArguments::new(what).into());
     }
-    let touch = Touch {
-        robot_z: touch.robot_z.filter(|_| loaded.cell.mount != Some(Mount::Fixed)),
-        ..touch
-    };
     let found = find(&loaded.calibration, &gauge(&loaded), &board, &sighting.corners, &touch)
         .map_err(anyhow::Error::from)
         .with_context(|| name.clone())?;

@@ -14,11 +14,12 @@ use crate::control::offset::{EXPONENTS, Found, Search, find};
 use crate::io::recording::Recording;
 use crate::offline::offset::{Print, gauge_length, print};
 use crate::units::Mm;
+use crate::vision::rank;
 
 /// Largest offset that is tried unless another is given.
 const FARTHEST: Mm = Mm::constant(1000.0);
 /// Smallest range of offsets that is a range \[mm\].
-const SHORTEST_SEARCH_MM: f64 = 1.0;
+const SHORTEST_SEARCH_MM: f64 = 50.0;
 
 /// Runs the command for a recording.
 pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
@@ -75,7 +76,10 @@ fn attached(recording: &Recording) -> anyhow::Result<(Cell, Calibration)> {
 
 /// Length of the gauge on the surface of then.
 fn gauge(cell: &Cell, calibration: &Calibration, print: &Print) -> anyhow::Result<Mm> {
-    let robot_z = print.states.last().map(|(_, state)| state.z_mm);
+    // Afterwards the robot may lift the camera.
+    let laying = print.states.iter().filter(|(_, state)| state.mode.lays_bead());
+    let mut heights: Vec<f64> = laying.map(|(_, state)| state.z_mm.get()).collect();
+    let robot_z = rank::median(&mut heights).and_then(|z| Mm::new(z).ok());
     let map = cell.surface(calibration, robot_z);
     gauge_length(&cell.gauge, &map).ok_or_else(|| {
         let what = "gauge.roi_px does not see the surface, as the calibration has it";

@@ -1,7 +1,8 @@
 //! The speed at which bead was laid, along the path.
 
 use super::data::Look;
-use crate::control::{RobotMode, RobotState};
+use super::data::float;
+use crate::control::RobotState;
 use crate::time::{Span, Stamp};
 use crate::units::{Mm, MmPerS};
 
@@ -54,7 +55,7 @@ impl Course {
         let mut beads: Vec<Bead> = Vec::new();
         let mut open = false;
         for (at, state) in states {
-            if !matches!(state.mode, RobotMode::Print | RobotMode::Hold) {
+            if !state.mode.lays_bead() {
                 open = false;
                 continue;
             }
@@ -255,9 +256,4 @@ impl Sums {
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates at 0")]
 fn number(place: f64) -> usize {
     place as usize
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a count of nodes")]
-fn float(count: usize) -> f64 {
-    count as f64
 }

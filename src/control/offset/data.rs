@@ -3,6 +3,7 @@
 use super::course::{Course, Sums};
 use super::whiten::Place;
 use crate::units::Mm;
+use crate::vision::rank;
 
 /// Shortest piece of path over which widths are taken together, under a short gauge
 /// \[mm\].
@@ -101,10 +102,7 @@ fn ends_of_pools(looks: &[Look], length_mm: f64) -> Vec<usize> {
 
 /// The middle one of some numbers; `None` without any.
 pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    values.sort_by(f64::total_cmp);
-    values.get(middle).copied()
+    rank::median(&mut values.collect::<Vec<_>>())
 }
 
 /// A count as a number.
