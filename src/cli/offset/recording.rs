@@ -19,7 +19,7 @@ use crate::vision::rank;
 /// Largest offset that is tried unless another is given.
 const FARTHEST: Mm = Mm::constant(1000.0);
 /// Smallest range of offsets that is a range \[mm\].
-const SHORTEST_SEARCH_MM: f64 = 50.0;
+const SHORTEST_SEARCH_MM: f64 = 20.0;
 
 /// Runs the command for a recording.
 pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
