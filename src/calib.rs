@@ -26,6 +26,7 @@ pub mod offset;
 pub mod outline;
 pub mod plane;
 pub mod quality;
+pub mod refusal;
 pub mod scale;
 pub mod share;
 pub mod sighting;

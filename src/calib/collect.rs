@@ -2,7 +2,8 @@
 //! with the board lying still on the bed, then one of every place in which it is held.
 
 use super::board::Board;
-use super::sighting::{Refusal, Sighting, shift_px};
+use super::refusal::Refusal;
+use super::sighting::{Sighting, shift_px};
 
 /// Looks in a row in which the board must lie still for the bed, and how far it may seem
 /// to move from one to the next \[px\].

@@ -173,7 +173,7 @@ impl Page<'_> {
     fn view(
         &self,
         name: &str,
-        look: &Result<crate::calib::sighting::Sighting, crate::calib::sighting::Refusal>,
+        look: &Result<crate::calib::sighting::Sighting, crate::calib::refusal::Refusal>,
         largest: f64,
     ) -> Markup {
         let view = self.solution.views.iter().find(|view| view.name == name);

@@ -9,7 +9,8 @@ use crate::calib::board::{Board, Seen};
 use crate::calib::charuco::NoMarkers;
 use crate::calib::equations::{Corner, Model};
 use crate::calib::plane::OnBed;
-use crate::calib::sighting::{Looks, Refusal, is_same_place};
+use crate::calib::refusal::Refusal;
+use crate::calib::sighting::{Looks, is_same_place};
 use crate::calib::solve::Solution;
 use crate::units::Mm;
 

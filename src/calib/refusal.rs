@@ -1,0 +1,137 @@
+//! Why a picture of a board is not used, with what to do about it.
+
+use super::board::NotABoard;
+use super::charuco::NoMarkers;
+use super::outline::Side;
+use super::sighting::{LEAST_CORNERS, LEAST_LINES};
+use crate::bridge::BridgeError;
+
+/// Why a picture is not used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// It cannot be read.
+    #[error("unreadable: {0}")]
+    Unreadable(String),
+    /// The board, all of it, is not to be seen.
+    #[error("no board with {columns}x{rows} inner corners")]
+    NoBoard {
+        /// Inner corners along a row.
+        columns: usize,
+        /// Inner corners along a column.
+        rows: usize,
+    },
+    /// A board with other counts.
+    #[error(
+        "a board with {}x{} inner corners shows, not one with {}x{}: see that all of it is in \
+         the picture, or correct --board",
+        found.0, found.1, expected.0, expected.1
+    )]
+    OtherBoard {
+        /// Inner corners that show, along a row and along a column.
+        found: (usize, usize),
+        /// Those of the board that was told.
+        expected: (usize, usize),
+    },
+    /// A larger board, of which the one that was told would be a part.
+    #[error(
+        "the board goes on beyond {columns}x{rows} inner corners, {}: count again and correct \
+         --board", sides_text(.sides)
+    )]
+    Larger {
+        /// Inner corners along a row that were told.
+        columns: usize,
+        /// Inner corners along a column.
+        rows: usize,
+        /// Where it goes on.
+        sides: Vec<Side>,
+    },
+    /// A smaller board, or something that looks like a corner of it.
+    #[error(
+        "no row of squares {} of {columns}x{rows} inner corners: count again and correct \
+         --board, or see that nothing covers the board", sides_text(.sides)
+    )]
+    Smaller {
+        /// Inner corners along a row that were told.
+        columns: usize,
+        /// Inner corners along a column.
+        rows: usize,
+        /// Where it ends.
+        sides: Vec<Side>,
+    },
+    /// Something like a board, but not one.
+    #[error("no sound board: {0}")]
+    NotABoard(#[from] NotABoard),
+    /// Out of focus.
+    #[error(
+        "blurred by {blur_px:.1} px: focus the lens on the board, and calibrate with that focus"
+    )]
+    Blurred {
+        /// Standard deviation of the blur \[px\].
+        blur_px: f64,
+    },
+    /// Taken in motion.
+    #[error(
+        "the board moved by {way_px:.1} px during the exposure: hold it still, or expose shorter"
+    )]
+    Moved {
+        /// How far \[px\].
+        way_px: f64,
+    },
+    /// The board is where it was in another picture.
+    #[error("the board is where it is in {of} (within {shift_px:.1} px), which says nothing new")]
+    Duplicate {
+        /// The other picture's name.
+        of: String,
+        /// Mean shift of the corners \[px\].
+        shift_px: f64,
+    },
+    /// It is not of the size that most others have.
+    #[error("size {found}, while most are {expected}", found = size_text(*.found), expected = size_text(*.expected))]
+    Size {
+        /// Its size \[px\].
+        found: [u32; 2],
+        /// The size of most pictures \[px\].
+        expected: [u32; 2],
+    },
+    /// A board with markers where a plain one was told.
+    #[error(
+        "a board with markers shows, not a plain one: give --marker-mm, and --dictionary if its \
+         markers are not of 4x4 cells"
+    )]
+    Marked,
+    /// A board whose markers are too small to be read, or a plain one.
+    #[error(
+        "a board shows, but no markers that can be read: if it is a plain one leave out \
+         --marker-mm, else bring it nearer to the camera"
+    )]
+    Plain,
+    /// The markers do not make the board.
+    #[error(transparent)]
+    NoMarkers(#[from] NoMarkers),
+    /// Too little of a board with markers.
+    #[error(
+        "only {count} corners of the board show: {LEAST_CORNERS} in {LEAST_LINES} rows and columns \
+         are needed"
+    )]
+    Little {
+        /// Corners that show.
+        count: usize,
+    },
+    /// OpenCV gave up on it.
+    #[error(transparent)]
+    Bridge(#[from] BridgeError),
+}
+
+fn size_text([width, height]: [u32; 2]) -> String {
+    format!("{width}x{height} px")
+}
+
+fn sides_text(sides: &[Side]) -> String {
+    let words = sides.iter().map(|side| match side {
+        Side::FirstColumn => "before the first column",
+        Side::LastColumn => "after the last column",
+        Side::FirstRow => "before the first row",
+        Side::LastRow => "after the last row",
+    });
+    words.collect::<Vec<_>>().join(" and ")
+}
