@@ -17,6 +17,14 @@ macro_rules! say {
     }};
 }
 
+/// Writes a line to standard error. Where nobody can be told, the work still goes on.
+macro_rules! tell {
+    ($($text:tt)*) => {{
+        use std::io::Write;
+        _ = writeln!(std::io::stderr(), $($text)*);
+    }};
+}
+
 pub mod accuracy;
 pub mod board;
 pub mod calibrate;
@@ -128,7 +136,7 @@ pub fn main() -> ExitCode {
         Command::Offset(args) => offset::run(args),
     };
     done.unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
+        tell!("error: {error:#}");
         status_of(&error)
     })
 }

@@ -195,6 +195,8 @@ fn what_a_live_calibration_cannot_do_is_told() {
         (&["--camera", "no/such/folder"], 1, "is not there"),
         (&["--camera", "x", "--plane", "y.png"], 2, "cannot be used with"),
         (&["--camera", "x", "--rate-hz", "0"], 2, "expected 0.1 to 1000"),
+        (&["--camera", "x", "--dictionary", "5x5"], 2, "--marker-mm"),
+        (&["film", "--pictures", "x"], 2, "--pictures x: only with --camera"),
         (&["--camera", "x", "--marker-mm", "15"], 2, "40 to 90 %"),
         (&["--camera", "x", "--marker-mm", "9", "--dictionary", "apriltag"], 2, "4x4, 5x5, 6x6"),
     ] {

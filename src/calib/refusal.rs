@@ -102,7 +102,7 @@ pub enum Refusal {
     /// A board whose markers are too small to be read, or a plain one.
     #[error(
         "a board shows, but no markers that can be read: if it is a plain one leave out \
-         --marker-mm, else bring it nearer to the camera"
+         --marker-mm, else bring it nearer, focus, and hold it still"
     )]
     Plain,
     /// The markers do not make the board.
@@ -110,12 +110,16 @@ pub enum Refusal {
     NoMarkers(#[from] NoMarkers),
     /// Too little of a board with markers.
     #[error(
-        "only {count} corners of the board show: {LEAST_CORNERS} in {LEAST_LINES} rows and columns \
-         are needed"
+        "only {count} corners of the board show, in {columns} columns and {rows} rows: {LEAST_CORNERS} \
+         in {LEAST_LINES} columns and {LEAST_LINES} rows are needed"
     )]
     Little {
         /// Corners that show.
         count: usize,
+        /// Columns that they are in.
+        columns: usize,
+        /// Rows that they are in.
+        rows: usize,
     },
     /// OpenCV gave up on it.
     #[error(transparent)]

@@ -120,9 +120,9 @@ fn with_markers(
         lines.len()
     };
     let count = seen.iter().flatten().count();
-    let fewer = lines(&|i| i % columns).min(lines(&|i| i / columns));
-    if count < LEAST_CORNERS || fewer < LEAST_LINES {
-        return Err(Refusal::Little { count });
+    let (in_columns, in_rows) = (lines(&|i| i % columns), lines(&|i| i / columns));
+    if count < LEAST_CORNERS || in_columns.min(in_rows) < LEAST_LINES {
+        return Err(Refusal::Little { count, columns: in_columns, rows: in_rows });
     }
     Ok(seen)
 }

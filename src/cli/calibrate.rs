@@ -110,7 +110,7 @@ pub struct BoardArgs {
     #[arg(long, value_name = "MM", value_parser = parse_square)]
     marker_mm: Option<Mm>,
     /// Cells of such markers: 4x4, 5x5, 6x6 or 7x7, or OpenCV's name of the dictionary
-    #[arg(long, value_name = "NAME", default_value = "4x4", value_parser = parse_dictionary)]
+    #[arg(long, value_name = "NAME", default_value = "4x4", value_parser = parse_dictionary, requires = "marker_mm")]
     dictionary: Dictionary,
 }
 
@@ -185,6 +185,10 @@ pub(super) struct Pictures {
 pub fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     let board = args.board.board()?;
     check_arguments(args)?;
+    if let (Some(_), Some(folder)) = (&args.input, &args.pictures) {
+        let what = format!("--pictures {}: only with --camera", folder.display());
+        return Err(WrongArguments::new(what).into());
+    }
     let pictures = match &args.input {
         Some(folder) => look_into(args, &board, folder)?,
         None => live::take(args, &board)?,
@@ -302,7 +306,7 @@ pub(super) fn check_size(sighting: &Sighting, expected: [u32; 2]) -> anyhow::Res
 
 fn progress(count: usize) -> ProgressBar {
     if !std::io::stderr().is_terminal() {
-        eprintln!("looking for the board in {count} images");
+        tell!("looking for the board in {count} images");
     }
     let style = ProgressStyle::with_template("looking for the board {wide_bar} {pos}/{len}");
     // Hidden by itself where standard error is not a terminal.

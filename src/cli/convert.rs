@@ -53,7 +53,7 @@ pub struct ConvertArgs {
     #[arg(long, value_name = "MM", value_parser = parse_square, requires = "plane")]
     marker_mm: Option<Mm>,
     /// Cells of such markers: 4x4, 5x5, 6x6 or 7x7, or OpenCV's name of the dictionary
-    #[arg(long, value_name = "NAME", default_value = "4x4", value_parser = parse_dictionary)]
+    #[arg(long, value_name = "NAME", default_value = "4x4", value_parser = parse_dictionary, requires = "marker_mm")]
     dictionary: Dictionary,
     /// Height of the board's printed face above the bed [mm] [default: 0]
     #[arg(long, value_name = "MM", value_parser = parse_length, requires = "plane")]
@@ -109,7 +109,7 @@ pub fn run(args: &ConvertArgs, voice: Voice) -> anyhow::Result<()> {
     say!("wrote {}", args.out.display());
     if !voice.quiet {
         for note in &notes {
-            eprintln!("note: {note}");
+            tell!("note: {note}");
         }
     }
     Ok(())

@@ -49,7 +49,7 @@ pub fn run(args: &DemoArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     let text = CELL.replace(SHIPPED_ADDRESS, &robot.local_addr().to_string());
     let loaded = LoadedCell::from_text(Path::new("demo.toml"), text, Purpose::Run)?;
     if !voice.quiet {
-        eprintln!(
+        tell!(
             "a simulated bead, camera and robot for {} s; the robot listens on {}",
             args.seconds,
             robot.local_addr()

@@ -27,7 +27,7 @@ pub fn tell(report: &LiveReport, out: &Path, max_rejected_share: f64) -> ExitCod
     say!("report     {}", out.join("report.html").display());
     match &report.recording {
         Ok(recording) => say!("recording  {}", recording.path.display()),
-        Err(incomplete) => eprintln!("warning: {incomplete}"),
+        Err(incomplete) => tell!("warning: {incomplete}"),
     }
     status(report, max_rejected_share)
 }
@@ -64,20 +64,20 @@ fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
     let faults = report.summary.control.as_ref().map_or(0, |control| control.faults);
     match &report.ending {
         Ending::CameraLost(why) => {
-            eprintln!("error: the camera gives no more frames: {why}");
+            tell!("error: the camera gives no more frames: {why}");
             return ExitCode::FAILURE;
         }
         Ending::RobotLimits(why) => {
-            eprintln!("error: {why}");
+            tell!("error: {why}");
             return ExitCode::from(2);
         }
         Ending::RecordingLost(why) => {
-            eprintln!("error: control ended in hold, because the run could not be recorded: {why}");
+            tell!("error: control ended in hold, because the run could not be recorded: {why}");
             return ExitCode::from(WITH_LOSS);
         }
         _ if faults > 0 => {
             let times = if faults == 1 { "once".to_owned() } else { format!("{faults} times") };
-            eprintln!("error: the controller gave up {times}; the report says why");
+            tell!("error: the controller gave up {times}; the report says why");
             return ExitCode::FAILURE;
         }
         Ending::Asked | Ending::TimeOver | Ending::LastFrame => {}
@@ -86,7 +86,7 @@ fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
     // beginning; that is no loss.
     let share = report.summary.rejected_share();
     if share > max_rejected_share && report.ending != Ending::Asked {
-        eprintln!(
+        tell!(
             "warning: {:.1} % of the frames were refused, the cell bears {:.1} %",
             share * 100.0,
             max_rejected_share * 100.0

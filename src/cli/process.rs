@@ -132,7 +132,7 @@ impl Bench<'_> {
             self.log.note(&Note::Remark("ended before the last frame, as was asked".into()));
         }
         if let Some(error) = failed {
-            eprintln!("warning: {error}; what was measured until then is kept");
+            tell!("warning: {error}; what was measured until then is kept");
             self.log.note(&Note::Remark(error.to_string()));
         }
         self.progress.finish();
@@ -208,7 +208,7 @@ fn conclude(args: &ProcessArgs, summary: &Summary, loaded: &LoadedCell) -> ExitC
     let share = summary.rejected_share();
     let most = loaded.cell.recording.max_rejected_share;
     if share > most {
-        eprintln!(
+        tell!(
             "warning: {:.1} % of the frames were refused, the cell bears {:.1} %",
             share * 100.0,
             most * 100.0

@@ -52,7 +52,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<ExitCode> {
     progress.finish_and_clear();
     let report = report.context("the replay ends here")?;
     if let Some(what) = recording.integrity().summary() {
-        eprintln!("warning: {}: {what}", recording.file());
+        tell!("warning: {}: {what}", recording.file());
     }
     let status = tell(&report);
     if report.compared == 0 && report.gap.is_none() {

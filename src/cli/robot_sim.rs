@@ -88,10 +88,10 @@ pub fn run(args: &RobotSimArgs) -> anyhow::Result<()> {
         Err(SimError::Params(error)) => return Err(WrongArguments::new(error).into()),
         Err(error) => return Err(error.into()),
     };
-    eprintln!("robot `{}` listens on {}; Ctrl-C ends it", args.name, sim.local_addr());
+    tell!("robot `{}` listens on {}; Ctrl-C ends it", args.name, sim.local_addr());
     signals.forever().next();
     sim.stop();
-    eprintln!("ended");
+    tell!("ended");
     Ok(())
 }
 
@@ -113,7 +113,7 @@ fn options(args: &RobotSimArgs) -> SimOptions {
 }
 
 fn print(at: Stamp, text: &str) {
-    eprintln!("{:9.3} s  {text}", at.secs());
+    tell!("{:9.3} s  {text}", at.secs());
 }
 
 fn parse_name(text: &str) -> Result<String, String> {

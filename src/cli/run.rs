@@ -107,7 +107,7 @@ pub fn drive(
         stop: stop.told().clone(),
         notice: Box::new(move |line| {
             if !quiet {
-                eprintln!("{line}");
+                tell!("{line}");
             }
         }),
         cell: loaded.cell.clone(),

@@ -86,11 +86,11 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
 
 fn status(loaded: &LoadedCell, summary: &crate::offline::Summary, end: LayerEnd) -> ExitCode {
     if !end.whole {
-        eprintln!("error: the robot stopped before the end of the bead; the report says why");
+        tell!("error: the robot stopped before the end of the bead; the report says why");
         return ExitCode::FAILURE;
     }
     if summary.rejected_share() > loaded.cell.recording.max_rejected_share {
-        eprintln!("warning: {:.1} % of the frames were refused", summary.rejected_share() * 100.0);
+        tell!("warning: {:.1} % of the frames were refused", summary.rejected_share() * 100.0);
         return ExitCode::from(WITH_LOSS);
     }
     ExitCode::SUCCESS

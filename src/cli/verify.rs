@@ -19,6 +19,8 @@ const MOST_PERCENT: f64 = 0.2;
 const STANDARD_DEVIATIONS: f64 = 3.0;
 /// A lens leaves so many times what it left when it was calibrated.
 const LENS_CHANGED: f64 = 2.0;
+/// A lens that leaves less is sound in any case \[px\].
+const LENS_CHANGED_PX: f64 = 0.15;
 /// A board that is further off its place than this is higher, and not the noise
 /// \[mm\].
 const HIGHER_MM: f64 = 0.3;
@@ -103,12 +105,21 @@ fn tell(found: &Findings, args: &VerifyArgs, borne: f64, rms_px: Option<f64>) {
     );
     let before = rms_px.map_or_else(String::new, |px| format!(" ({px:.3} px when calibrated)"));
     say!("reprojection error of the lens alone {:.3} px{before}", found.reprojection_rms_px);
+    let how = format!(
+        "{} % are borne, and {STANDARD_DEVIATIONS} standard deviations of what the calibration leaves",
+        args.max_error_percent
+    );
     if found.holds(borne) {
-        say!("HOLDS: no width is more than {:.3} % wrong", 100.0 * borne);
+        say!(
+            "HOLDS: beyond the corners' noise no width is more than {:.3} % wrong ({how})",
+            100.0 * borne
+        );
         return;
     }
-    say!("DOES NOT HOLD: a width is more than {:.3} % wrong", 100.0 * borne);
-    if rms_px.is_some_and(|px| found.reprojection_rms_px > LENS_CHANGED * px) {
+    say!("DOES NOT HOLD: a width is more than {:.3} % wrong ({how})", 100.0 * borne);
+    let has_changed =
+        |px: f64| found.reprojection_rms_px > (LENS_CHANGED * px).max(LENS_CHANGED_PX);
+    if rms_px.is_some_and(has_changed) {
         say!("  the lens is not as it was: focus, zoom or the board's flatness; calibrate anew");
     } else if found.tilt_deg > FLAT_DEG {
         say!("  the board does not lie flat on the bed: it is tilted by {:.1}°", found.tilt_deg);

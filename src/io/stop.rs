@@ -1,7 +1,7 @@
 //! How a person or a system ends a command: the first SIGINT or SIGTERM asks
 //! for an orderly end, a second one ends it at once.
 
-use std::io;
+use std::io::{self, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -46,7 +46,8 @@ fn wait(signals: &mut Signals, heard: &AtomicBool, tell: &Sender<()>) {
             // The person insists; 128 + the signal is what a shell would say.
             std::process::exit(128 + signal);
         }
-        eprintln!("ending in order; once more ends at once");
+        // Where standard error is gone there is nobody to tell.
+        let _ = writeln!(io::stderr(), "ending in order; once more ends at once");
         if tell.send(()).is_err() {
             return;
         }

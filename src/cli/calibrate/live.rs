@@ -53,7 +53,11 @@ pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<Pictures> {
     std::fs::create_dir_all(&folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let mut taking = Taking::new(args, board, (folder, is_folder_new));
-    taking.run(camera.as_mut(), &stop)?;
+    let done = taking.run(camera.as_mut(), &stop);
+    if taking.files.is_empty() {
+        taking.clear();
+    }
+    done?;
     taking.finish()
 }
 
@@ -129,7 +133,10 @@ impl<'a> Taking<'a> {
                     self.screen.state(&format!("unreadable: {reason}"));
                     false
                 }
-                Ok(None) => break,
+                Ok(None) => {
+                    self.screen.say("the camera has ended");
+                    break;
+                }
                 Err(error) if self.files.is_empty() => return Err(error.into()),
                 Err(error) => {
                     self.screen.say(&format!("{error}; ending with the pictures so far"));
@@ -137,6 +144,7 @@ impl<'a> Taking<'a> {
                 }
             };
             if is_enough {
+                self.screen.say("that is enough");
                 break;
             }
         }
@@ -205,13 +213,16 @@ impl<'a> Taking<'a> {
         is_enough(self.args, &conclusion)
     }
 
+    /// Takes the folder away again, into which nothing was put.
+    fn clear(&self) {
+        if self.is_folder_new {
+            let _ = std::fs::remove_dir(&self.folder);
+        }
+    }
+
     fn finish(self) -> anyhow::Result<Pictures> {
         self.screen.end();
         if self.files.is_empty() {
-            if self.is_folder_new {
-                // Nothing was put into it.
-                let _ = std::fs::remove_dir(&self.folder);
-            }
             bail!("the camera has not shown the board lying still on the bed; nothing was written");
         }
         let pictures = taken(&self.files, self.collector.kept());
@@ -236,7 +247,7 @@ fn progress(args: &CalibrateArgs, conclusion: &Conclusion<'_>) -> String {
     let mut text = String::new();
     let width = conclusion.worst_mm().map_or_else(
         || "how well a width is known cannot be told yet".to_owned(),
-        |worst| format!("a width is known to {worst:.4} mm"),
+        |worst| format!("a width is known to {worst:.4} mm where boards were seen"),
     );
     let asked = args.max_width_sigma_mm;
     let asked = asked.map_or_else(String::new, |limit| format!(" ({} mm asked for)", limit.get()));

@@ -78,7 +78,8 @@ pub fn lens(solution: &Solution) -> String {
     for trial in &solution.trials {
         let name = trial.free.lens.map_or("", |lens| lens.name());
         let bend = if trial.free.bend { ", bent board" } else { "" };
-        let held_out = trial.held_out_px.map_or_else(|| "-".to_owned(), |px| format!("{px:.4}"));
+        let held_out =
+            trial.held_out_px.map_or_else(|| "not told".to_owned(), |px| format!("{px:.4}"));
         let folds = if trial.folds { "  turns over within the picture" } else { "" };
         let mark = if trial.free == solution.free { "  <- taken" } else { "" };
         line!(

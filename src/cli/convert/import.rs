@@ -13,9 +13,9 @@ use crate::units::Mm;
 
 /// Corners on the bed may be so far off \[px\]; beyond that the pictures do not belong
 /// to this camera, or the boards lay on no plane.
-const MOST_OFF_PX: f64 = 1.0;
+const MOST_OFF_PX: f64 = 0.5;
 /// A sharp picture of a flat board and a sound lens leave less \[px\].
-const DOUBTED_PX: f64 = 0.5;
+const DOUBTED_PX: f64 = 0.3;
 
 /// The text of a calibration: the camera of others, and a bed plane from pictures.
 pub fn text(

@@ -1,6 +1,6 @@
 //! From a picture of a board that the nozzle touches.
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use nalgebra::Vector2;
 
 use super::super::WrongArguments;
@@ -19,6 +19,12 @@ const TOUCH: Mm = Mm::constant(0.5);
 const SIDEWAYS_MM: f64 = 3.0;
 /// Share by which a board may measure larger or smaller than it was said to be.
 const SCALE: f64 = 0.005;
+/// The same beyond which nothing is told.
+const NO_BOARD: f64 = 0.03;
+/// Corners further off a true board than this are of another plane \[mm\].
+const NOT_FLAT_MM: f64 = 2.0;
+/// Squares beyond the outermost ones that a nozzle may be told to be.
+const BEYOND: f64 = 2.0;
 /// Corners further off a true board than this were not measured on its plane \[mm\].
 const FLAT_MM: f64 = 0.5;
 
@@ -41,6 +47,15 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
         return Err(WrongArguments::new(what).into());
     };
     let board = board.board()?;
+    let (columns, rows) = board.corners();
+    for (at, count) in at.into_iter().zip([columns, rows]) {
+        #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
+        let (from, to) = (-1.0 - BEYOND, count as f64 + BEYOND);
+        if !(from..=to).contains(&at) {
+            let what = format!("--nozzle-at: found {at}, expected {from} to {to} on this board");
+            return Err(WrongArguments::new(what).into());
+        }
+    }
     let touch = touch(args, at)?;
     let loaded = LoadedCell::read(cell, Purpose::Measure)?;
     let Some(expected) = loaded.calibration.image_size_px() else {
@@ -60,6 +75,16 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     let found = find(&loaded.calibration, &gauge(&loaded), &board, &sighting.corners, &touch)
         .map_err(anyhow::Error::from)
         .with_context(|| name.clone())?;
+    if found.scale_error.abs() > NO_BOARD || found.rms_mm > NOT_FLAT_MM {
+        bail!(
+            "{name}: the board measures {:+.1} % of its size, and its corners lie {:.2} mm off a true \
+             one: it does not lie on the bed of this calibration with its face {} above it; see \
+             --square-mm, --board-thickness-mm and --robot-z-mm",
+            100.0 * found.scale_error,
+            found.rms_mm,
+            touch.thickness
+        );
+    }
     answer(&found, touch, loaded.cell.run.as_ref().map(|run| run.camera.offset));
     Ok(())
 }

@@ -40,7 +40,7 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     let name = args.input.display().to_string();
     let print = print(&mut recording).context("the recording cannot be read on")?;
     if let Some(what) = recording.integrity().summary() {
-        eprintln!("warning: {name}: {what}");
+        tell!("warning: {name}: {what}");
     }
     let gauge = gauge(&cell, &calibration, &print)?;
     let found = find(&print.states, &print.widths, Search { gauge, farthest })
