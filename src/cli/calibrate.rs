@@ -50,7 +50,7 @@ pub struct CalibrateArgs {
     #[arg(required_unless_present = "camera", conflicts_with = "camera")]
     input: Option<PathBuf>,
     /// Take the pictures now, with this camera, as a cell names it: camera:0,
-    /// gst:<pipeline>, an http address, or recorded frames
+    /// gst:PIPELINE, an http address, or recorded frames
     #[arg(long, value_name = "SOURCE")]
     camera: Option<String>,
     /// Folder for the pictures that are taken
