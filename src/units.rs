@@ -147,11 +147,34 @@ unit!(
     /// Acceleration along the path \[mm/s²\].
     MmPerS2, "mm/s²"
 );
+unit!(
+    /// Area of a bead's section \[mm²\].
+    Mm2, "mm²"
+);
+unit!(
+    /// Volume of material a second \[mm³/s\].
+    Mm3PerS, "mm³/s"
+);
+unit!(
+    /// Pressure at the nozzle \[MPa\].
+    MPa, "MPa"
+);
+unit!(
+    /// Speed of a screw or of a wheel, in turns a minute \[rpm\].
+    Rpm, "rpm"
+);
 
 impl Mul<Span> for MmPerS {
     type Output = Mm;
     fn mul(self, span: Span) -> Mm {
         Mm(saturate(self.0 * span.secs()))
+    }
+}
+
+impl Mul<Mm2> for MmPerS {
+    type Output = Mm3PerS;
+    fn mul(self, section: Mm2) -> Mm3PerS {
+        Mm3PerS(saturate(self.0 * section.0))
     }
 }
 
@@ -181,6 +204,12 @@ mod tests {
         assert_eq!((huge + huge).get(), f64::MAX);
         assert_eq!((huge * f64::NAN).get(), 0.0);
         assert_eq!((huge * -2.0).get(), f64::MIN);
+    }
+
+    #[test]
+    fn a_section_at_a_speed_is_a_flow() {
+        let flow = MmPerS::constant(30.0) * Mm2::constant(4.0);
+        assert_eq!(flow.get(), 120.0);
     }
 
     #[test]

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 /// `config` comes before `sim`, whose plain parameter types it fills.
 const LAYERS: [&[&str]; 9] = [
     &["units", "time"],
-    &["frame", "geometry"],
-    &["bridge", "calib", "vision", "control", "link", "config"],
+    &["frame", "geometry", "model"],
+    &["bridge", "calib", "vision", "control", "extruder", "identify", "link", "config"],
     &["controller"],
     &["ports", "runner"],
     &["sim"],

@@ -37,6 +37,18 @@ pub const DEMAND: Ink = ink("demand", [150, 150, 158], [128, 132, 142]);
 pub const LIMIT: Ink = ink("limit", [128, 114, 20], [204, 194, 92]);
 /// Refused frames.
 pub const REJECTED: Ink = ink("rejected", [213, 94, 0], [236, 122, 38]);
+/// Material that leaves the nozzle a second, measured or simulated.
+pub const FLOW: Ink = ink("flow", [0, 138, 140], [64, 196, 196]);
+/// Pressure at the nozzle.
+pub const PRESSURE: Ink = ink("pressure", [92, 72, 168], [160, 146, 230]);
+/// Speed of a screw or of a wheel, and whatever else an extruder is told.
+pub const SCREW: Ink = ink("screw", [150, 94, 40], [206, 152, 98]);
+/// What a model foretells.
+pub const MODEL: Ink = ink("model", [230, 159, 0], [240, 180, 60]);
+/// What a source's own method does, beside this program's.
+pub const PAPER: Ink = ink("paper", [213, 94, 0], [236, 122, 38]);
+/// What this program's best method does.
+pub const OURS: Ink = ink("ours", [0, 114, 178], [76, 172, 226]);
 /// The robot is not printing.
 pub const IDLE: Ink = ink("idle", [190, 196, 206], [140, 148, 160]);
 /// First stretch, at the start speed.
@@ -54,9 +66,9 @@ pub const RIGHT_EDGE: Ink = ink("right-edge", [240, 228, 66], [240, 228, 66]);
 /// The gauge in a picture.
 pub const GAUGE: Ink = ink("gauge", [0, 158, 115], [0, 158, 115]);
 
-const ALL: [Ink; 15] = [
-    WIDTH, TARGET, SPEED, SETPOINT, DEMAND, LIMIT, REJECTED, IDLE, PRIMING, TRACKING, HOLDING,
-    FAULT, LEFT_EDGE, RIGHT_EDGE, GAUGE,
+const ALL: [Ink; 21] = [
+    WIDTH, TARGET, SPEED, SETPOINT, DEMAND, LIMIT, REJECTED, FLOW, PRESSURE, SCREW, MODEL, PAPER,
+    OURS, IDLE, PRIMING, TRACKING, HOLDING, FAULT, LEFT_EDGE, RIGHT_EDGE, GAUGE,
 ];
 
 impl Ink {
