@@ -156,7 +156,7 @@ unit!(
     Mm3PerS, "mm³/s"
 );
 unit!(
-    /// Pressure at the nozzle \[MPa\].
+    /// Pressure at the nozzle, in megapascal.
     MPa, "MPa"
 );
 unit!(

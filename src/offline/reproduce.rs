@@ -1,17 +1,19 @@
 //! The experiments of the source papers beside what was published: a table,
-//! `reproduce.json` and a page with plots.
+//! `reproduce.json` and a page with plots. Each source has a file of its own
+//! here, and its experiments in `sim`.
 
 use maud::{Markup, html};
 use serde::Serialize;
 
-use super::report::area::{Area, XAxis};
-use super::report::plot::{Layer as Drawn, Plot, y_range};
-use super::report::sections::legend;
+use super::Progress;
 use super::report::series::Series;
-use super::report::{palette, whole_page};
-use crate::control::limiter::Limits;
-use crate::sim::barjuei2022::StandOff;
-use crate::sim::score::{AlongBead, Score};
+use super::report::whole_page;
+use crate::config::Problems;
+use crate::sim::cell::SimError;
+use crate::sim::render::RenderError;
+
+pub mod barjuei2022;
+pub mod table;
 
 /// One quantity of one experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -34,165 +36,163 @@ pub struct Row {
     pub ours: Option<f64>,
 }
 
-/// The rows as a table for people.
-pub fn table(rows: &[Row]) -> String {
-    let width = rows.iter().map(|row| row.case.chars().count()).max().unwrap_or(4);
-    let mut text = format!(
-        "{:width$}  {:28} {:5} {:>9} {:>9} {:>9}\n",
-        "case", "quantity", "unit", "published", "simulated", "ours"
-    );
-    for row in rows {
-        let [published, simulated, ours] = [row.published, row.simulated, row.ours].map(number);
-        let line = format!(
-            "{:width$}  {:28} {:5} {published:>9} {simulated:>9} {ours:>9}\n",
-            row.case, row.quantity, row.unit
-        );
-        text.push_str(&line);
-    }
-    text
+/// A paper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// Shojaei Barjuei et al. 2022: width by robot speed.
+    Barjuei2022,
 }
 
-fn number(value: Option<f64>) -> String {
-    value.map_or("–".to_owned(), |value| {
-        let digits = if value.abs() >= 20.0 { 1 } else { 2 };
-        let text = format!("{value:.digits$}");
-        if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
-            text.trim_start_matches('-').to_owned()
-        } else {
-            text
-        }
-    })
+/// How much is spent on an experiment with noise; none is the source's own
+/// number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Effort {
+    /// Seeds of every experiment with noise.
+    pub seeds: Option<u64>,
+    /// Seeds of every experiment whose frames are rendered.
+    pub frame_seeds: Option<u64>,
 }
 
-/// What the page of the 2022 paper shows.
+/// An experiment that could not be run.
+#[derive(Debug, thiserror::Error)]
+pub enum ReproduceError {
+    /// The cell that ships with the program cannot be read.
+    #[error("the cell of the experiments: {0}")]
+    Cell(#[from] Problems),
+    /// It lacks what a run needs.
+    #[error("the cell of the experiments is not complete enough for a run")]
+    NoRun,
+    /// The simulated cell cannot be.
+    #[error(transparent)]
+    Sim(#[from] SimError),
+    /// A picture cannot be rendered.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}
+
+/// What a source came to.
 #[derive(Debug)]
-pub struct Barjuei2022<'a> {
-    /// The table.
-    pub rows: &'a [Row],
-    /// Each layer's target \[mm\] and its first seed.
-    pub layers: &'a [(f64, Score)],
-    /// The cell's limits.
-    pub limits: Limits,
-    /// The stand-off curve.
-    pub stand_off: &'a [StandOff],
+pub struct Reproduced {
+    /// Authors, year and what was reproduced.
+    pub title: &'static str,
     /// How often and with what.
-    pub about: &'a str,
+    pub about: String,
+    /// The table.
+    pub rows: Vec<Row>,
+    /// The plots, in the order in which they are read.
+    pub sections: Vec<Section>,
 }
 
-impl Barjuei2022<'_> {
-    /// The page.
-    pub fn page(&self) -> String {
-        let title = "Shojaei Barjuei et al. 2022, reproduced";
-        let body = html! {
-            h1 { (title) }
-            p.hint { (self.about) }
+/// A part of the page.
+#[derive(Debug)]
+pub struct Section {
+    /// Its heading.
+    pub heading: String,
+    /// What is seen in it; may be empty.
+    pub hint: String,
+    /// The plots.
+    pub drawing: Markup,
+}
+
+impl Source {
+    /// All of them, in the order of the page.
+    pub const ALL: [Self; 1] = [Self::Barjuei2022];
+
+    /// The name that `reproduce.json` and the command line have.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Barjuei2022 => "barjuei2022",
+        }
+    }
+
+    /// What it is about, in one line.
+    pub const fn about(self) -> &'static str {
+        match self {
+            Self::Barjuei2022 => "Shojaei Barjuei et al. 2022: width by robot speed",
+        }
+    }
+
+    /// How many experiments [`Self::run`] reports to its progress.
+    pub const fn experiments(self) -> u64 {
+        match self {
+            Self::Barjuei2022 => barjuei2022::EXPERIMENTS,
+        }
+    }
+
+    /// Runs the source's experiments.
+    pub fn run(
+        self,
+        effort: Effort,
+        progress: &mut Progress,
+    ) -> Result<Reproduced, ReproduceError> {
+        match self {
+            Self::Barjuei2022 => barjuei2022::run(effort, progress),
+        }
+    }
+}
+
+/// The page of one source or of several.
+pub fn page(sources: &[Reproduced]) -> String {
+    let title = match sources {
+        [only] => format!("{}, reproduced", only.title),
+        _ => "The sources, reproduced".to_owned(),
+    };
+    let body = html! {
+        h1 { (title) }
+        @for source in sources {
+            @if sources.len() > 1 { h1 { (source.title) } }
+            p.hint { (source.about) }
             section {
                 h2 { "Beside the published numbers" }
-                (self.markup_table())
+                (table::markup(&source.rows))
             }
-            @for (target, score) in self.layers {
+            @for part in &source.sections {
                 section {
-                    h2 { "Layer of " (target) " mm" }
-                    (self.layer(*target, score))
+                    h2 { (part.heading) }
+                    @if !part.hint.is_empty() { p.hint { (part.hint) } }
+                    (part.drawing)
                 }
             }
-            section {
-                h2 { "Stand-off" }
-                p.hint { "A bead of 42 mm that lies nearer to the camera, or farther, than where \
-                    the scale was taken." }
-                (self.stand_off())
-            }
-            footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))
-                ". The numbers are in reproduce.json." }
-        };
-        whole_page(title, &body).into_string()
+        }
+        footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))
+            ". The numbers are in reproduce.json." }
+    };
+    whole_page(&title, &body).into_string()
+}
+
+/// Rows of one source as they come.
+#[derive(Debug)]
+pub struct Rows {
+    seed: &'static str,
+    rows: Vec<Row>,
+}
+
+impl Rows {
+    /// No rows yet.
+    pub const fn of(source: Source) -> Self {
+        Self { seed: source.name(), rows: Vec::new() }
     }
 
-    fn markup_table(&self) -> Markup {
-        html! {
-            table {
-                thead { tr {
-                    @for head in ["case", "quantity", "unit", "published", "simulated", "ours"] {
-                        th { (head) }
-                    }
-                } }
-                tbody { @for row in self.rows { tr {
-                    td { (row.case) }
-                    td { (row.quantity) }
-                    td { (row.unit) }
-                    @for value in [row.published, row.simulated, row.ours] { td { (number(value)) } }
-                } } }
-            }
-        }
+    /// Adds a row: the case, then quantity and unit, then what is published,
+    /// what the paper's method gives, and ours.
+    pub fn push(
+        &mut self,
+        case: impl Into<String>,
+        (quantity, unit): (&'static str, &'static str),
+        [published, simulated, ours]: [Option<f64>; 3],
+    ) {
+        let (seed, case) = (self.seed, case.into());
+        self.rows.push(Row { seed, case, quantity, unit, published, simulated, ours });
     }
 
-    fn layer(&self, target: f64, score: &Score) -> Markup {
-        let (width, speed) = (series(&score.widths), series(&score.speeds));
-        let Some(range) = speed.extent() else { return html! {} };
-        let axis = XAxis::path(range);
-        let name = format!("{target} mm");
-        let bounds = [self.limits.min_speed.get(), self.limits.max_speed.get()];
-        let names = bounds.map(|bound| format!("{bound} mm/s"));
-        let widths = Plot {
-            area: Area::wide(220.0),
-            x: &axis,
-            y_title: "width [mm]",
-            y_range: y_range(&[&width], &[target]),
-            layers: vec![
-                Drawn::Curve(&width, palette::WIDTH),
-                Drawn::Level(target, palette::TARGET, &name),
-            ],
-        };
-        let speeds = Plot {
-            area: Area::wide(220.0),
-            x: &axis,
-            y_title: "speed [mm/s]",
-            y_range: y_range(&[&speed], &bounds),
-            layers: vec![
-                Drawn::Curve(&speed, palette::SPEED),
-                Drawn::Level(bounds[0], palette::LIMIT, &names[0]),
-                Drawn::Level(bounds[1], palette::LIMIT, &names[1]),
-            ],
-        };
-        html! {
-            (legend(&[("measured width", palette::WIDTH, ""), ("target", palette::TARGET, "dash")]))
-            (widths.draw())
-            (legend(&[("robot", palette::SPEED, ""), ("limits of the cell", palette::LIMIT, "dash")]))
-            (speeds.draw())
-        }
-    }
-
-    fn stand_off(&self) -> Markup {
-        let pick = |value: fn(&StandOff) -> f64| {
-            let points: Vec<AlongBead> =
-                self.stand_off.iter().map(|point| (point.nearer_mm, value(point))).collect();
-            series(&points)
-        };
-        let (scale, full) = (pick(|p| p.scale_error_mm), pick(|p| p.full_error_mm));
-        let Some(range) = scale.extent() else { return html! {} };
-        let axis =
-            XAxis { title: "height above the calibrated one [mm]".to_owned(), range, divisor: 1.0 };
-        let plot = Plot {
-            area: Area::wide(260.0),
-            x: &axis,
-            y_title: "error of the width [mm]",
-            y_range: y_range(&[&scale, &full], &[]),
-            layers: vec![
-                Drawn::Curve(&scale, palette::REJECTED),
-                Drawn::Curve(&full, palette::WIDTH),
-            ],
-        };
-        html! {
-            (legend(&[
-                ("single scale, as published", palette::REJECTED, ""),
-                ("full calibration, height given", palette::WIDTH, ""),
-            ]))
-            (plot.draw())
-        }
+    /// The rows.
+    pub fn into_vec(self) -> Vec<Row> {
+        self.rows
     }
 }
 
-fn series(points: &[AlongBead]) -> Series {
+/// Points as a curve that can be drawn.
+pub fn series(points: &[(f64, f64)]) -> Series {
     let mut series = Series::default();
     for (x, y) in points {
         series.push(*x, *y);
@@ -206,25 +206,19 @@ mod tests {
 
     #[test]
     fn a_row_has_the_keys_that_others_rely_on() {
-        let row = Row {
-            seed: "barjuei2022",
-            case: "44 mm".into(),
-            quantity: "mean error",
-            unit: "mm",
-            published: Some(1.3),
-            simulated: Some(1.46),
-            ours: None,
-        };
+        let mut rows = Rows::of(Source::Barjuei2022);
+        rows.push("44 mm", ("mean error", "mm"), [Some(1.3), Some(1.46), None]);
+        let rows = rows.into_vec();
         assert_eq!(
-            serde_json::to_string(&row).unwrap(),
+            serde_json::to_string(&rows[0]).unwrap(),
             r#"{"seed":"barjuei2022","case":"44 mm","quantity":"mean error","unit":"mm","published":1.3,"simulated":1.46,"ours":null}"#
         );
-        assert!(table(&[row]).contains("1.46"));
+        assert!(table::plain(&rows).contains("1.46"));
     }
 
     #[test]
-    fn nothing_is_not_less_than_nothing() {
-        assert_eq!(number(Some(-0.001)), "0.00");
-        assert_eq!(number(Some(-0.01)), "-0.01");
+    fn every_source_has_a_name_of_its_own() {
+        let names: std::collections::BTreeSet<_> = Source::ALL.iter().map(|s| s.name()).collect();
+        assert_eq!(names.len(), Source::ALL.len());
     }
 }
