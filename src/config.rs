@@ -3,6 +3,7 @@
 
 pub mod cell;
 pub mod control;
+pub mod extruder;
 pub mod problem;
 pub mod rendered;
 pub mod table;

@@ -10,4 +10,4 @@ pub mod step;
 pub mod transport;
 
 pub use event::{Event, RobotLimits, RobotMode, RobotState};
-pub use step::{Command, Fault, Hold, Limit, State, Step, Trace};
+pub use step::{Command, ExtruderStep, Fault, Hold, Limit, State, Step, Trace};

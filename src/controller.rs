@@ -16,7 +16,11 @@ use crate::control::limiter::Limits;
 use crate::control::pi::{Pi, Saturation};
 use crate::control::transport::Transport;
 use crate::control::{
-    Command, Event, Fault, Hold, Limit, RobotLimits, RobotMode, RobotState, State, Step, Trace,
+    Command, Event, ExtruderStep, Fault, Hold, Limit, RobotLimits, RobotMode, RobotState, State,
+    Step, Trace,
+};
+use crate::extruder::{
+    ExtruderFault, ExtruderSetup, ExtruderState, FlowDemand, Laying, Supervisor,
 };
 use crate::time::{Span, Stamp};
 use crate::units::{Mm, MmPerS};
@@ -58,10 +62,19 @@ enum Phase {
     Fault { why: Fault },
 }
 
-/// The width controller of a cell.
+/// The extruder side of a controller, where a cell has one.
+#[derive(Debug, Clone, PartialEq)]
+struct ExtruderSide {
+    supervisor: Supervisor,
+    demand: FlowDemand,
+}
+
+/// The controller of a cell: the width by the robot's speed and, where the
+/// cell says so, the flow by the extruder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Controller {
     setup: Setup,
+    extruder: Option<ExtruderSide>,
     phase: Phase,
     /// A hold that only a new run ends.
     ended: bool,
@@ -82,6 +95,7 @@ impl Controller {
     pub fn new(setup: Setup) -> Self {
         Self {
             setup,
+            extruder: None,
             phase: Phase::Idle,
             ended: false,
             link_up: false,
@@ -95,8 +109,74 @@ impl Controller {
         }
     }
 
+    /// The same with an extruder that is commanded.
+    pub fn with_extruder(mut self, setup: ExtruderSetup, demand: FlowDemand) -> Self {
+        self.extruder = Some(ExtruderSide { supervisor: Supervisor::new(setup), demand });
+        self
+    }
+
     /// Answers an event that happened at `now`.
     pub fn step(&mut self, now: Stamp, event: &Event) -> Step {
+        let mut step = self.steer(now, event);
+        step.extruder = self.extrude(now, event);
+        if let Some(why) = self.extruder_fault()
+            && matches!(self.phase, Phase::Priming | Phase::Tracking { .. } | Phase::Holding { .. })
+            && !self.ended
+        {
+            self.phase = Phase::Fault { why: Fault::Extruder(why) };
+            step.state = self.state();
+        }
+        step
+    }
+
+    /// The extruder side's answer to what concerns it.
+    fn extrude(&mut self, now: Stamp, event: &Event) -> Option<ExtruderStep> {
+        let laying = self.laying();
+        let ExtruderSide { supervisor, .. } = self.extruder.as_mut()?;
+        let command = match event {
+            Event::Extruder(report) => {
+                supervisor.reported(now, report);
+                None
+            }
+            Event::ExtruderUp => {
+                supervisor.link_came_up();
+                None
+            }
+            Event::ExtruderDown { .. } => {
+                supervisor.link_went_down(now);
+                None
+            }
+            Event::ExtruderTick => supervisor.tick(now, laying),
+            Event::Stop => supervisor.stop(),
+            _ => return None,
+        };
+        Some(ExtruderStep { command, state: supervisor.state(), trace: supervisor.trace() })
+    }
+
+    /// What the extruder side has to know of the robot's.
+    fn laying(&self) -> Laying {
+        let Some(ExtruderSide { demand, .. }) = &self.extruder else { return Laying::Idle };
+        match &self.phase {
+            Phase::Idle => Laying::Idle,
+            Phase::Fault { .. } => Laying::Stopped,
+            _ if self.ended => Laying::Stopped,
+            Phase::Priming | Phase::Tracking { .. } | Phase::Holding { .. } => {
+                let told = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
+                let robot = self.robot.map(|robot| (told, robot.speed_mm_per_s));
+                Laying::Bead(demand.wanted(robot))
+            }
+        }
+    }
+
+    fn extruder_fault(&self) -> Option<ExtruderFault> {
+        match self.extruder.as_ref()?.supervisor.state() {
+            ExtruderState::Fault(why) => Some(why),
+            _ => None,
+        }
+    }
+
+    /// The robot side's answer.
+    fn steer(&mut self, now: Stamp, event: &Event) -> Step {
         let mut trace = Trace::default();
         let command = match event {
             Event::Measured { frame, captured_at, width_mm, .. } => {
@@ -124,7 +204,11 @@ impl Controller {
                 self.hold_if_printing(now, Hold::LinkDown);
                 None
             }
-            Event::Refused { .. } => None,
+            Event::Refused { .. }
+            | Event::Extruder(_)
+            | Event::ExtruderUp
+            | Event::ExtruderDown { .. }
+            | Event::ExtruderTick => None,
             Event::Tick => self.tick(now, &mut trace),
             Event::CameraLost { .. } => {
                 self.hold_if_printing(now, Hold::CameraLost);
@@ -140,7 +224,7 @@ impl Controller {
             }
         };
         trace.limit = self.limit;
-        Step { command, state: self.state(), trace }
+        Step { command, state: self.state(), trace, extruder: None }
     }
 
     /// The state in words for outside.

@@ -1,3 +1,27 @@
 //! The extruder side: what to command the extruder so that the flow at the
 //! nozzle is what the robot is about to need. Like the width controller it
 //! keeps no clock and opens nothing.
+//!
+//! ```text
+//! flow that is wanted ─┐
+//! reports (50 Hz) ─────┼─▶ Supervisor ─▶ Law: foresee (200 Hz), answer (20 Hz) ─▶ limits ─▶ command (50 Hz)
+//! ticks (200 Hz) ──────┘
+//! ```
+
+pub mod demand;
+pub mod law;
+pub mod limits;
+pub mod profile;
+pub mod quantity;
+pub mod rates;
+pub mod report;
+pub mod state;
+pub mod supervisor;
+
+pub use demand::{FlowDemand, Follows};
+pub use law::Law;
+pub use limits::{CommandLimit, CommandLimits};
+pub use quantity::Quantity;
+pub use report::{ExtruderCommand, ExtruderReport, PumpMode};
+pub use state::{ExtruderFault, ExtruderHold, ExtruderState, ExtruderTrace};
+pub use supervisor::{ExtruderSetup, Laying, Supervisor};

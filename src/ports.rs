@@ -2,6 +2,7 @@
 //! simulated side.
 
 use crate::control::{Command, Event, Step};
+use crate::extruder::ExtruderCommand;
 use crate::frame::Frame;
 use crate::time::Stamp;
 
@@ -57,6 +58,23 @@ pub trait RobotPort {
     /// robot cannot take it now (no connection, or not printing); that is not
     /// an error, because the link reports its own loss as an [`Event`].
     fn send(&mut self, now: Stamp, command: Command) -> Option<u64>;
+}
+
+/// Takes commands to the extruder.
+pub trait ExtruderPort {
+    /// Sends a command; false where the extruder cannot take it now, which is
+    /// not an error, because the link reports its own loss as an [`Event`].
+    fn send(&mut self, now: Stamp, command: ExtruderCommand) -> bool;
+}
+
+/// The extruder of a cell whose extruder goes its own way.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NoExtruder;
+
+impl ExtruderPort for NoExtruder {
+    fn send(&mut self, _: Stamp, _: ExtruderCommand) -> bool {
+        false
+    }
 }
 
 /// Keeps what happened.

@@ -3,14 +3,15 @@
 
 use crate::control::{Event, Step};
 use crate::controller::Controller;
-use crate::ports::{RecordError, Recorder, RobotPort};
+use crate::ports::{ExtruderPort, NoExtruder, RecordError, Recorder, RobotPort};
 use crate::time::Stamp;
 
-/// A controller with its robot and its recorder.
+/// A controller with its robot, its recorder and its extruder.
 #[derive(Debug)]
-pub struct Runner<R, K> {
+pub struct Runner<R, K, X = NoExtruder> {
     controller: Controller,
     robot: R,
+    extruder: X,
     recorder: K,
     failure: Option<RecordError>,
 }
@@ -25,9 +26,16 @@ pub struct Handled {
 }
 
 impl<R: RobotPort, K: Recorder> Runner<R, K> {
-    /// Plugs a controller in.
+    /// Plugs a controller in whose extruder goes its own way.
     pub fn new(controller: Controller, robot: R, recorder: K) -> Self {
-        Self { controller, robot, recorder, failure: None }
+        Self::with_extruder(controller, robot, NoExtruder, recorder)
+    }
+}
+
+impl<R: RobotPort, K: Recorder, X: ExtruderPort> Runner<R, K, X> {
+    /// Plugs a controller in.
+    pub fn with_extruder(controller: Controller, robot: R, extruder: X, recorder: K) -> Self {
+        Self { controller, robot, extruder, recorder, failure: None }
     }
 
     /// Answers an event: step, send, record, in this order, so that the disk
@@ -36,6 +44,9 @@ impl<R: RobotPort, K: Recorder> Runner<R, K> {
     pub fn handle(&mut self, now: Stamp, event: &Event) -> Handled {
         let step = self.controller.step(now, event);
         let sent = step.command.and_then(|command| self.robot.send(now, command));
+        if let Some(command) = step.extruder.and_then(|extruder| extruder.command) {
+            let _ = self.extruder.send(now, command);
+        }
         if self.failure.is_none()
             && let Err(error) = self.recorder.record(now, event, &step)
         {
@@ -60,6 +71,11 @@ impl<R: RobotPort, K: Recorder> Runner<R, K> {
     /// The robot's side.
     pub fn robot_mut(&mut self) -> &mut R {
         &mut self.robot
+    }
+
+    /// The extruder's side.
+    pub fn extruder_mut(&mut self) -> &mut X {
+        &mut self.extruder
     }
 
     /// Takes everything apart at the end.

@@ -11,6 +11,7 @@ pub mod convolve;
 pub mod discs;
 pub mod disturbance;
 pub mod edge;
+pub mod extruder;
 pub mod follow;
 pub mod grains;
 pub mod hash;

@@ -9,7 +9,11 @@ use super::WrongArguments;
 use crate::calib::{Calibration, SurfaceMap};
 use crate::config::Cell;
 use crate::config::cell::{CalibrationSource, Purpose};
-use crate::io::calibration_file;
+use crate::config::extruder::Strategy;
+use crate::extruder::Law;
+use crate::io::{calibration_file, profile_file};
+use crate::sim::cell::Rig;
+use crate::sim::extruder::SimExtruder;
 use crate::units::Mm;
 
 /// A cell, its calibration, and their texts for the recording.
@@ -53,6 +57,31 @@ impl LoadedCell {
             }
         };
         Ok(Self { path: path.to_owned(), text, cell, calibration, calibration_text })
+    }
+
+    /// The extruder side as a simulated cell has it; none where the cell has
+    /// none. Reads the files that the cell names for it.
+    pub fn simulated_extruder(&self) -> anyhow::Result<Option<Rig>> {
+        let part = self.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
+        let Some(part) = part else { return Ok(None) };
+        let Some(plant) = &part.plant else {
+            return Err(WrongArguments::new(format!(
+                "{}: [extruder_plant]: found nothing, expected what answers the extruder's \
+                 commands in a simulated cell",
+                self.path.display()
+            ))
+            .into());
+        };
+        let law = match &part.extruder.strategy {
+            Strategy::Constant { value } => Law::Constant(*value),
+            Strategy::Profile { file } => Law::Profile(profile_file::read(file)?),
+        };
+        Ok(Some(Rig {
+            setup: part.extruder.setup(law),
+            demand: part.demand,
+            plant: SimExtruder::of(plant),
+            nominal_flow: part.plant_nominal,
+        }))
     }
 
     /// The map of the measured surface, for a camera that rides as the cell

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use super::WITH_LOSS;
 use crate::live::{Ending, LiveReport};
-use crate::offline::Summary;
+use crate::offline::{Summary, names};
 
 /// A folder name that is free: the name itself, or with the first number that
 /// is.
@@ -57,7 +57,16 @@ pub fn figures(summary: &Summary) {
     if let (Some(p50), Some(p99)) = (control.latency_ms.p50, control.latency_ms.p99) {
         say!("latency    {p50:.2} ms median, {p99:.2} ms p99");
     }
+    if let Some(extruder) = &summary.extruder
+        && let (Some(error), Some(mean)) =
+            (extruder.flow_error_rms_mm3_per_s, extruder.flow_mean_mm3_per_s)
+    {
+        say!("flow       {mean:.1} mm³/s on average, {error:.1} mm³/s RMS from what was wanted");
+    }
     say!("faults     {}", control.faults);
+    for (reason, count) in &control.fault_reasons {
+        say!("           {count} {}", names::spoken(reason));
+    }
 }
 
 fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {

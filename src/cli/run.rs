@@ -73,6 +73,14 @@ pub fn drive(
         }
     }
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
+    if run.extruder.is_some() {
+        return Err(WrongArguments::new(format!(
+            "{}: [extruder]: found a table, expected none in a live run: there is no link to an \
+             extruder yet; truebead simulate runs both sides",
+            loaded.path.display()
+        ))
+        .into());
+    }
     let stop = StopSignal::install().context("cannot wait for signals")?;
     let log = RunLog::create(LogOptions {
         folder: out.to_owned(),
@@ -86,7 +94,7 @@ pub fn drive(
         gauge: loaded.cell.gauge,
         target: loaded.cell.target,
         max_rejected_share: loaded.cell.recording.max_rejected_share,
-        control: Some(ControlFacts { limits: run.limits }),
+        control: Some(ControlFacts::of(&run)),
     })?;
     let record = RecordConfig {
         frames: loaded.cell.recording.frames,

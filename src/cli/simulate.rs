@@ -18,7 +18,7 @@ use crate::offline::{
 use crate::runner::NoRecorder;
 use crate::sim::cell::{LayerEnd, Sight, SimCell, Witness};
 use crate::time::Stamp;
-use crate::units::Mm;
+use crate::units::{Mm, Mm3PerS};
 
 /// Runs the closed loop on a simulated cell.
 #[derive(Debug, Args)]
@@ -49,7 +49,9 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
         loaded.cell.simulation.seed = seed;
     }
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
-    let mut sim = SimCell::new(&loaded.cell, &run, loaded.calibration.clone(), NoRecorder)?;
+    let extruder = loaded.simulated_extruder()?;
+    let calibration = loaded.calibration.clone();
+    let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, NoRecorder, extruder)?;
     let log = RunLog::create(LogOptions {
         folder: args.out.clone(),
         title: format!("Simulation of {}", args.scenario.display()),
@@ -61,7 +63,7 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
         gauge: loaded.cell.gauge,
         target: loaded.cell.target,
         max_rejected_share: loaded.cell.recording.max_rejected_share,
-        control: Some(ControlFacts { limits: run.limits }),
+        control: Some(ControlFacts::of(&run)),
     })?;
     let progress = Progress::new("simulating", "s", None, voice.quiet);
     let mut logger = Logger { log, failed: None, progress };
@@ -115,6 +117,10 @@ impl Witness for Logger {
             reason = "simulated seconds"
         )]
         self.progress.set(now.secs() as u64);
+    }
+
+    fn flow(&mut self, now: Stamp, wanted: Option<Mm3PerS>, flow: Mm3PerS) {
+        self.log.flow(now, wanted, flow);
     }
 
     fn look(&mut self, sight: &Sight<'_>) {

@@ -157,6 +157,14 @@ impl<'a> Table<'a> {
         Some(table)
     }
 
+    /// A table that only a run reads, and that it may lack: complete in a run
+    /// where it stands at all.
+    pub fn optional_run_table(&self, key: &'static str) -> Option<Table<'a>> {
+        let mut table = self.table(key)?;
+        table.strict = self.document.for_run;
+        Some(table)
+    }
+
     /// A table that must be there.
     pub fn required_table(&self, key: &'static str) -> Option<Table<'a>> {
         if !self.has(key) {

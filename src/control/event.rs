@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::extruder::ExtruderReport;
 use crate::time::Stamp;
 use crate::units::{Mm, MmPerS};
 
@@ -51,6 +52,17 @@ pub enum Event {
     },
     /// It is time for a setpoint: the fixed rate of the robot link.
     Tick,
+    /// The extruder reported.
+    Extruder(ExtruderReport),
+    /// The link to the extruder came up, or came up again.
+    ExtruderUp,
+    /// The link to the extruder was lost.
+    ExtruderDown {
+        /// Why, in words for the operator.
+        reason: String,
+    },
+    /// It is time for a step of the extruder's feedforward.
+    ExtruderTick,
     /// The camera gives no more frames.
     CameraLost {
         /// Why, in words for the operator.

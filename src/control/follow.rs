@@ -1,4 +1,4 @@
-//! Whether the robot moves at the speed that it was told.
+//! Whether the robot moves, or a screw turns, at the speed that it was told.
 
 use crate::time::{Span, Stamp};
 use crate::units::MmPerS;
@@ -41,8 +41,13 @@ pub enum Verdict {
 impl Follow {
     /// Compares a report with the setpoint that it should follow.
     pub fn observe(&mut self, now: Stamp, told: MmPerS, driven: MmPerS) -> Verdict {
-        let off = driven - told;
-        let share = off.get() / told.get().max(1.0);
+        self.observe_share(now, driven.get(), told.get())
+    }
+
+    /// The same for a speed of any unit; below 1 of it a difference counts as
+    /// if it were one of 1.
+    pub fn observe_share(&mut self, now: Stamp, driven: f64, told: f64) -> Verdict {
+        let share = (driven - told) / told.max(1.0);
         mark(&mut self.slower, now, share < -LIMITED);
         mark(&mut self.faster, now, share > LIMITED);
         mark(&mut self.outside, now, share.abs() > TOLERANCE);

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::extruder::{ExtruderCommand, ExtruderFault, ExtruderState, ExtruderTrace};
 use crate::time::Stamp;
 use crate::units::{Mm, MmPerS};
 
@@ -70,6 +71,8 @@ pub enum Fault {
     Robot,
     /// The robot stopped without having been told to.
     RobotStopped,
+    /// The extruder was stopped.
+    Extruder(ExtruderFault),
 }
 
 /// The state that the controller is in after a step.
@@ -137,6 +140,18 @@ pub struct Trace {
     pub limit: Limit,
 }
 
+/// What the extruder side did.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct ExtruderStep {
+    /// What to send to the extruder now; often nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command: Option<ExtruderCommand>,
+    /// The state after the event.
+    pub state: ExtruderState,
+    /// The numbers behind the command.
+    pub trace: ExtruderTrace,
+}
+
 /// The answer to one event.
 #[must_use = "a step says what to send to the robot"]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -148,4 +163,7 @@ pub struct Step {
     pub state: State,
     /// The numbers behind it.
     pub trace: Trace,
+    /// The extruder side's part, in the steps that are its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub extruder: Option<ExtruderStep>,
 }

@@ -10,11 +10,13 @@ use super::report::charts::Charts;
 use super::row::FrameRow;
 use super::summary::{Note, Summary, SummaryBuilder};
 use super::widths::WidthsWriter;
+use crate::config::cell::RunPart;
 use crate::control::limiter::Limits;
 use crate::control::{Event, Step};
+use crate::extruder::Quantity;
 use crate::frame::Frame;
 use crate::time::Stamp;
-use crate::units::Mm;
+use crate::units::{Mm, Mm3PerS};
 use crate::vision::{Edges, Gauge};
 
 /// Most remarks that a report lists.
@@ -44,6 +46,16 @@ pub struct LogOptions {
 pub struct ControlFacts {
     /// What setpoints may be.
     pub limits: Limits,
+    /// What the extruder is told, where it is commanded.
+    pub extruder: Option<Quantity>,
+}
+
+impl ControlFacts {
+    /// Of a cell's run.
+    pub fn of(run: &RunPart) -> Self {
+        let extruder = run.extruder.as_ref().map(|part| part.extruder.quantity);
+        Self { limits: run.limits, extruder }
+    }
 }
 
 /// The log of a run. Memory does not grow with its length.
@@ -108,6 +120,12 @@ impl RunLog {
         }
     }
 
+    /// The true flow through the nozzle, where a simulation knows it.
+    pub fn flow(&mut self, now: Stamp, wanted: Option<Mm3PerS>, flow: Mm3PerS) {
+        self.charts.extruder.flow(now, flow);
+        self.summary.flow(wanted, flow);
+    }
+
     /// The latency of a setpoint and what its sender waited by its own
     /// schedule \[ms\].
     pub fn latency(&mut self, latency_ms: f64, send_wait_ms: f64) {
@@ -135,6 +153,7 @@ impl RunLog {
             summary: &summary,
             charts: &self.charts,
             limits: self.options.control.map(|control| control.limits),
+            extruder: self.options.control.and_then(|control| control.extruder),
             latencies: self.summary.latencies(),
             pictures: &self.pictures.finish(),
             remarks: &self.remarks,

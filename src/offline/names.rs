@@ -1,6 +1,7 @@
 //! Names of reasons as they stand in files, and as people read them.
 
 use crate::control::{Fault, Hold, Limit};
+use crate::extruder::{CommandLimit, ExtruderFault, ExtruderHold};
 
 /// Name of a limit in `widths.csv` and `summary.json`.
 pub fn limit(limit: Limit) -> &'static str {
@@ -36,13 +37,48 @@ pub fn fault(fault: &Fault) -> String {
         Fault::SpeedMismatch => "speed_mismatch".to_string(),
         Fault::Robot => "robot".to_string(),
         Fault::RobotStopped => "robot_stopped".to_string(),
+        Fault::Extruder(why) => format!("extruder_{}", extruder_fault(*why)),
+    }
+}
+
+/// Name of a reason for the extruder's holding.
+pub const fn extruder_hold(hold: ExtruderHold) -> &'static str {
+    match hold {
+        ExtruderHold::LinkDown => "link_down",
+        ExtruderHold::NoReading => "no_reading",
+        ExtruderHold::SpeedMismatch => "speed_mismatch",
+    }
+}
+
+/// Name of a fault of the extruder side.
+pub fn extruder_fault(fault: ExtruderFault) -> String {
+    match fault {
+        ExtruderFault::HeldTooLong(why) => format!("held_too_long_{}", extruder_hold(why)),
+        ExtruderFault::DidNotStart => "did_not_start".to_owned(),
+        ExtruderFault::Pump => "pump".to_owned(),
+        ExtruderFault::Overpressure => "overpressure".to_owned(),
+        ExtruderFault::SpeedMismatch => "speed_mismatch".to_owned(),
+    }
+}
+
+/// Name of a limit that acted on the extruder's command.
+pub const fn command_limit(limit: CommandLimit) -> &'static str {
+    match limit {
+        CommandLimit::None => "none",
+        CommandLimit::Min => "min",
+        CommandLimit::Max => "max",
+        CommandLimit::Rise => "rise",
+        CommandLimit::Fall => "fall",
     }
 }
 
 /// A name as it is shown to people.
 pub fn spoken(name: &str) -> String {
-    match name.strip_prefix("held_too_long_") {
-        Some(why) => format!("held too long: {}", spoken(why)),
-        None => name.replace('_', " "),
+    if let Some(why) = name.strip_prefix("extruder_") {
+        format!("extruder: {}", spoken(why))
+    } else if let Some(why) = name.strip_prefix("held_too_long_") {
+        format!("held too long: {}", spoken(why))
+    } else {
+        name.replace('_', " ")
     }
 }

@@ -4,6 +4,7 @@ pub mod advice;
 pub mod area;
 pub mod axis;
 pub mod charts;
+pub mod extruder;
 pub mod headline;
 pub mod histogram;
 pub mod palette;
@@ -21,6 +22,7 @@ use super::picker::Chosen;
 use super::stats::Distribution;
 use super::summary::Summary;
 use crate::control::limiter::Limits;
+use crate::extruder::Quantity;
 
 /// Everything that a page is made of.
 #[derive(Debug)]
@@ -37,6 +39,8 @@ pub struct Report<'a> {
     pub charts: &'a Charts,
     /// What setpoints may be; none without a controller.
     pub limits: Option<Limits>,
+    /// What the extruder is told; none where it goes its own way.
+    pub extruder: Option<Quantity>,
     /// Latencies \[ms\]; none without a controller.
     pub latencies: Option<&'a Distribution>,
     /// Frames with their edges.
@@ -61,6 +65,7 @@ impl Report<'_> {
             (headline::tiles(self.summary))
             (sections::over_time(self))
             (sections::over_path(self))
+            @if let Some(quantity) = self.extruder { (self.charts.extruder.section(quantity)) }
             (sections::rejections(self))
             (sections::pictures(self))
             (sections::hints(self))

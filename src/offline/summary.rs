@@ -1,6 +1,7 @@
 //! `summary.json`: what a run came to, in numbers.
 
 mod control;
+mod extruder;
 mod follow;
 
 use std::collections::BTreeMap;
@@ -10,6 +11,8 @@ use serde::Serialize;
 
 pub use control::ControlSummary;
 use control::ControlTally;
+pub use extruder::ExtruderSummary;
+use extruder::ExtruderTally;
 pub use follow::Follower;
 
 use super::output::{LogError, write_whole};
@@ -18,7 +21,7 @@ use super::setup;
 use super::stats::{Distribution, Moments, as_f64};
 use crate::control::{Event, Step};
 use crate::time::Stamp;
-use crate::units::Mm;
+use crate::units::{Mm, Mm3PerS};
 
 /// What a run came to. What is not known is null.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -53,6 +56,9 @@ pub struct Summary {
     /// What only a run with a controller has; its keys stand beside the others.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub control: Option<ControlSummary>,
+    /// What only a run has whose extruder is commanded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub extruder: Option<ExtruderSummary>,
 }
 
 /// Medians over the measured frames, within 0.14 %, for whoever sets up light
@@ -127,6 +133,7 @@ pub struct SummaryBuilder {
     first_s: Option<f64>,
     last_s: Option<f64>,
     control: Option<ControlTally>,
+    extruder: ExtruderTally,
 }
 
 impl SummaryBuilder {
@@ -148,6 +155,7 @@ impl SummaryBuilder {
             first_s: None,
             last_s: None,
             control: with_control.then(|| ControlTally::new(target)),
+            extruder: ExtruderTally::default(),
         }
     }
 
@@ -181,9 +189,15 @@ impl SummaryBuilder {
     /// A step of the controller.
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         self.moment(Some(now.secs()));
+        self.extruder.step(now, event, step);
         if let Some(control) = &mut self.control {
             control.step(now, event, step);
         }
+    }
+
+    /// The true flow, and the wanted one while bead is laid.
+    pub fn flow(&mut self, wanted: Option<Mm3PerS>, flow: Mm3PerS) {
+        self.extruder.flow(wanted, flow);
     }
 
     /// The latency of a setpoint and what its sender waited by its own
@@ -224,6 +238,7 @@ impl SummaryBuilder {
             duration_s: self.first_s.zip(self.last_s).map(|(first, last)| last - first),
             target_width_mm: self.target.map(Mm::get),
             control: self.control.as_ref().map(ControlTally::finish),
+            extruder: self.extruder.finish(),
         }
     }
 

@@ -57,6 +57,7 @@ pub fn options(folder: &Path, title: &str, with_control: bool) -> LogOptions {
                 max_speed: MmPerS::constant(150.0),
                 max_accel: MmPerS2::constant(2000.0),
             },
+            extruder: None,
         }),
     }
 }
@@ -161,6 +162,7 @@ fn setpoint(time: f64) -> Step {
         command: moving.then_some(Command::Speed(speed)),
         state: state_at(time),
         trace: Trace { limit, demand_mm_per_s: wish, ..Trace::default() },
+        extruder: None,
     }
 }
 

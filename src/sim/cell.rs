@@ -1,6 +1,7 @@
 //! The simulated cell: the same controller, runner and robot as a live one, in
 //! simulated time. Events come in the order of time; at the same moment the
-//! robot reports first, then the camera sees, then a setpoint is sent.
+//! robot reports first, then the extruder, then the camera sees, then a setpoint is
+//! sent, and last the extruder side takes its step.
 
 mod camera;
 mod port;
@@ -10,12 +11,14 @@ use crate::config::Cell;
 use crate::config::cell::RunPart;
 use crate::control::{Command, Event, RobotMode, Step};
 use crate::controller::{Controller, Setup};
+use crate::extruder::{ExtruderReport, ExtruderSetup, ExtruderState, FlowDemand};
 use crate::link::{ParamError, RobotCell, RobotParams};
 use crate::ports::Recorder;
 use crate::runner::{Handled, Runner};
 use crate::time::{Span, Stamp};
-use crate::units::{Mm, MmPerS, MmPerS2};
+use crate::units::{Mm, Mm3PerS, MmPerS, MmPerS2};
 
+use super::extruder::SimExtruder;
 use super::hash;
 use super::laid::LaidBead;
 use super::render::RenderError;
@@ -32,6 +35,23 @@ const ROBOT_ACCEL: MmPerS2 = MmPerS2::constant(1e6);
 /// Share of the start speed from which the start counts as over.
 const STARTED: f64 = 0.99;
 
+/// Share of the nominal flow below which nothing is laid.
+const LEAST_FLOW: f64 = 1e-3;
+
+/// An extruder that is commanded: what the controller knows of it, and what
+/// answers.
+#[derive(Debug)]
+pub struct Rig {
+    /// What the controller knows.
+    pub setup: ExtruderSetup,
+    /// The flow that is wanted.
+    pub demand: FlowDemand,
+    /// What answers.
+    pub plant: SimExtruder,
+    /// Flow at which the bead is as wide as its model says.
+    pub nominal_flow: Mm3PerS,
+}
+
 /// Is told what happens in a simulated cell.
 pub trait Witness {
     /// An event and the controller's answer.
@@ -39,6 +59,10 @@ pub trait Witness {
 
     /// What the camera saw; comes after the step that answered it.
     fn look(&mut self, sight: &Sight<'_>);
+
+    /// The flow through the nozzle of an extruder that is commanded, and the
+    /// one that is wanted while bead is laid.
+    fn flow(&mut self, _now: Stamp, _wanted: Option<Mm3PerS>, _flow: Mm3PerS) {}
 }
 
 /// A cell that cannot be simulated.
@@ -56,7 +80,10 @@ pub enum SimError {
 pub struct SimCell<K> {
     run: RunPart,
     cell: Cell,
-    runner: Runner<SimPort, K>,
+    runner: Runner<SimPort, K, Option<SimExtruder>>,
+    /// Flow at which the bead is as wide as its model says, where an extruder
+    /// is commanded.
+    nominal_flow: Option<Mm3PerS>,
     camera: SimCamera,
     bead: LaidBead,
     now: Stamp,
@@ -79,12 +106,24 @@ pub struct LayerEnd {
 }
 
 impl<K: Recorder> SimCell<K> {
-    /// A cell as its file describes it, with the robot idle and connected.
+    /// A cell as its file describes it, with the robot idle and connected, and
+    /// an extruder that goes its own way.
     pub fn new(
         cell: &Cell,
         run: &RunPart,
         calibration: Calibration,
         recorder: K,
+    ) -> Result<Self, SimError> {
+        Self::with_extruder(cell, run, calibration, recorder, None)
+    }
+
+    /// The same with an extruder that is commanded.
+    pub fn with_extruder(
+        cell: &Cell,
+        run: &RunPart,
+        calibration: Calibration,
+        recorder: K,
+        extruder: Option<Rig>,
     ) -> Result<Self, SimError> {
         let simulation = &cell.simulation;
         let params = RobotParams {
@@ -98,10 +137,17 @@ impl<K: Recorder> SimCell<K> {
             ..RobotParams::default()
         };
         let port = SimPort::new(RobotCell::new(params, Stamp::START)?, run.robot.valid_ms);
-        let controller = Controller::new(Setup::from(run));
+        let mut controller = Controller::new(Setup::from(run));
+        let nominal_flow = extruder.as_ref().map(|rig| rig.nominal_flow);
+        let mut plant = None;
+        if let Some(rig) = extruder {
+            controller = controller.with_extruder(rig.setup, rig.demand);
+            plant = Some(rig.plant);
+        }
         let mut sim = Self {
             camera: SimCamera::new(cell, calibration)?,
-            runner: Runner::new(controller, port, recorder),
+            runner: Runner::with_extruder(controller, port, plant, recorder),
+            nominal_flow,
             run: run.clone(),
             cell: cell.clone(),
             bead: Self::fresh_bead(cell, 0),
@@ -115,6 +161,9 @@ impl<K: Recorder> SimCell<K> {
         };
         let robot = sim.runner.robot_mut().connect(Stamp::START);
         let _ = sim.runner.handle(Stamp::START, &Event::LinkUp { robot });
+        if sim.nominal_flow.is_some() {
+            let _ = sim.runner.handle(Stamp::START, &Event::ExtruderUp);
+        }
         Ok(sim)
     }
 
@@ -160,6 +209,18 @@ impl<K: Recorder> SimCell<K> {
                     }
                 }
                 What::Frame => self.look(witness),
+                What::ExtruderReport => {
+                    if let Some((flow, report)) = self.extruder_reports() {
+                        let step = self.tell(&Event::Extruder(report), witness).step;
+                        let side = step.extruder.unwrap_or_default();
+                        let laying = side.state == ExtruderState::Running;
+                        let wanted = laying.then_some(side.trace.flow_mm3_per_s);
+                        witness.flow(self.now, wanted, flow);
+                    }
+                }
+                What::ExtruderTick => {
+                    let _ = self.tell(&Event::ExtruderTick, witness);
+                }
                 What::Tick => {
                     let handled = self.tell(&Event::Tick, witness);
                     if let (Some(_), Some(Command::Speed(speed))) =
@@ -178,23 +239,49 @@ impl<K: Recorder> SimCell<K> {
         handled
     }
 
-    /// Lays the bead up to where the nozzle is now. While the robot gathers
-    /// speed the flow is gathered with it, so that the bead begins as wide as
-    /// it is at the start speed.
+    fn extruder_reports(&mut self) -> Option<(Mm3PerS, ExtruderReport)> {
+        let now = self.now;
+        let extruder = self.runner.extruder_mut().as_mut()?;
+        extruder.advance(now);
+        Some((extruder.flow(), extruder.report()))
+    }
+
+    /// Lays the bead up to where the nozzle is now.
     fn lay(&mut self) {
         let state = self.runner.robot_mut().state(self.now);
         let path = state.path_mm.get() - self.bead_start;
-        let start_speed = self.run.robot.start_speed.get();
-        let mut speed = state.speed_mm_per_s.get();
-        if !self.started {
-            self.started = speed >= STARTED * start_speed;
-            speed = start_speed;
-        }
+        let speed = self.speed_of_flow(state.speed_mm_per_s.get());
         let (from, last) = self.laid_to;
         if path > from && matches!(state.mode, RobotMode::Print | RobotMode::Hold) {
-            self.bead.lay_ramp((from, path), (last, speed));
-            self.laid_to = (path, speed);
+            // A piece that is not laid is a gap.
+            if let Some(speed) = speed {
+                self.bead.lay_ramp((from, path), (last, speed));
+            }
+            self.laid_to = (path, speed.unwrap_or(last));
         }
+    }
+
+    /// The speed at which the bead's model is asked: that at which the nominal
+    /// flow lays as wide a bead as the present flow at the robot's speed. None
+    /// where nothing flows.
+    ///
+    /// Without an extruder that is commanded the flow is gathered with the
+    /// speed while the robot starts, so that the bead begins as wide as it is
+    /// at the start speed.
+    fn speed_of_flow(&mut self, speed: f64) -> Option<f64> {
+        let now = self.now;
+        let Some(nominal) = self.nominal_flow else {
+            let start_speed = self.run.robot.start_speed.get();
+            if self.started {
+                return Some(speed);
+            }
+            self.started = speed >= STARTED * start_speed;
+            return Some(start_speed);
+        };
+        let extruder = self.runner.extruder_mut().as_mut()?;
+        extruder.advance(now);
+        let share = extruder.flow() / nominal;
+        (share > LEAST_FLOW).then(|| speed / share)
     }
 
     fn look(&mut self, witness: &mut impl Witness) {
@@ -234,15 +321,26 @@ impl<K: Recorder> SimCell<K> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum What {
     Report,
+    ExtruderReport,
     Frame,
     Tick,
+    ExtruderTick,
 }
 
-/// The three clocks of a cell.
+/// One clock of a cell: period and phase \[s\], how often it has struck, and
+/// what for.
+#[derive(Debug, Clone, Copy)]
+struct Clock {
+    period: f64,
+    phase: f64,
+    count: u32,
+    what: What,
+}
+
+/// The clocks of a cell; at the same moment the first of them comes first.
 struct Ticker {
     began: Stamp,
-    /// Period, phase \[s\] and count of reports, frames and ticks.
-    clocks: [(f64, f64, u32); 3],
+    clocks: Vec<Clock>,
 }
 
 impl Ticker {
@@ -260,25 +358,30 @@ impl Ticker {
             let share = (word >> 11) as f64 / (1_u64 << 53) as f64;
             (share * period / step).floor() * step
         };
-        let clocks = [(step, 0.0, 0), (frame, phase(1, frame), 0), (tick, phase(2, tick), 0)];
+        let clock = |period, phase, what| Clock { period, phase, count: 0, what };
+        let mut clocks = vec![
+            clock(step, 0.0, What::Report),
+            clock(frame, phase(1, frame), What::Frame),
+            clock(tick, phase(2, tick), What::Tick),
+        ];
+        if let Some(part) = &run.extruder {
+            let rates = part.extruder.rates;
+            clocks.insert(1, clock(1.0 / rates.io_hz, 0.0, What::ExtruderReport));
+            clocks.push(clock(1.0 / rates.feedforward_hz, 0.0, What::ExtruderTick));
+        }
         Self { began, clocks }
     }
 
     fn next(&mut self) -> (Stamp, What) {
-        let due = |k: usize| {
-            let (period, phase, count) = self.clocks[k];
-            self.began + Span::from_secs(phase + period * f64::from(count))
+        let due = |clock: &Clock| {
+            self.began + Span::from_secs(clock.phase + clock.period * f64::from(clock.count))
         };
-        let dues = [due(0), due(1), due(2)];
-        let first = if dues[0] <= dues[1] && dues[0] <= dues[2] {
-            0
-        } else if dues[1] <= dues[2] {
-            1
-        } else {
-            2
-        };
-        self.clocks[first].2 += 1;
-        (dues[first], [What::Report, What::Frame, What::Tick][first])
+        let first = self.clocks.iter_mut().min_by_key(|clock| due(clock));
+        first.map_or((self.began, What::Report), |clock| {
+            let at = due(clock);
+            clock.count += 1;
+            (at, clock.what)
+        })
     }
 }
 

@@ -32,7 +32,7 @@ pub struct WriterThread<S> {
 }
 
 enum Turn {
-    Answered(Answered),
+    Answered(Box<Answered>),
     Frame(EncodedFrame),
     FramesEnded,
     Ended,
@@ -163,7 +163,9 @@ fn next_turn(
     wait: Duration,
 ) -> Turn {
     select_biased! {
-        recv(answered) -> item => item.map_or(Turn::Ended, Turn::Answered),
+        recv(answered) -> item => {
+            item.map_or(Turn::Ended, |item| Turn::Answered(Box::new(item)))
+        },
         recv(frames) -> frame => frame.map_or(Turn::FramesEnded, Turn::Frame),
         default(wait) => Turn::Nothing,
     }

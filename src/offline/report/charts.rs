@@ -1,6 +1,7 @@
 //! What the plots are drawn from, gathered one fact at a time in bounded
 //! memory.
 
+use super::extruder::ExtruderCharts;
 use super::series::Series;
 use super::strip::{Mark, Strip};
 use crate::control::{Event, State, Step};
@@ -64,6 +65,8 @@ pub struct Charts {
     pub states: Strip,
     /// Limits that acted.
     pub limits: Strip,
+    /// The extruder side.
+    pub extruder: ExtruderCharts,
     follower: Follower,
 }
 
@@ -94,6 +97,7 @@ impl Charts {
     /// A step of the controller.
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         self.timed.get_or_insert(true);
+        self.extruder.step(now, event, step);
         let time = now.secs();
         let before = self.follower.setpoint();
         let _ = self.follower.step(now, event, step);

@@ -78,8 +78,15 @@ impl Ink {
     }
 }
 
-/// The colour of a controller's state, by its name; none of another name.
+/// The colour of a state of the controller or of its extruder side, by its
+/// name; none of another name.
 pub fn state(name: &str) -> Option<Ink> {
+    let name = match name {
+        "off" => "idle",
+        "starting" => "priming",
+        "running" => "tracking",
+        same => same,
+    };
     [IDLE, PRIMING, TRACKING, HOLDING, FAULT].into_iter().find(|ink| ink.name == name)
 }
 

@@ -27,6 +27,7 @@ fn step(state: State, limit: Limit) -> Step {
         command: Some(Command::Speed(MmPerS::constant(100.0))),
         state,
         trace: Trace { limit, ..Trace::default() },
+        extruder: None,
     }
 }
 

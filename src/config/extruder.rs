@@ -1,0 +1,239 @@
+//! `[extruder]` and `[extruder_plant]`: what the extruder is told and what it
+//! may be told, and for a simulated cell what answers. There are no defaults
+//! for limits.
+
+use std::path::{Path, PathBuf};
+
+use super::table::Table;
+use crate::extruder::demand::section;
+use crate::extruder::{CommandLimits, ExtruderSetup, FlowDemand, Follows, Law, Quantity};
+use crate::time::Span;
+use crate::units::{MPa, Mm, MmPerS};
+
+/// Any number that a command of an extruder can be, as a bound on slips.
+const ANY: std::ops::RangeInclusive<f64> = -1e9..=1e9;
+
+/// The extruder side of a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Extruder {
+    /// What is commanded.
+    pub quantity: Quantity,
+    /// What commands may be.
+    pub limits: CommandLimits,
+    /// How commands are found.
+    pub strategy: Strategy,
+    /// Height of a layer.
+    pub layer_height: Mm,
+    /// What the flow goes by.
+    pub follows: Follows,
+    /// How often what is done.
+    pub rates: Rates,
+    /// Longest time without a report over which the strategy goes on.
+    pub max_gap: Span,
+    /// Longest hold, and longest start, before the pump is stopped.
+    pub max_hold: Span,
+    /// Pressure at which the pump is stopped, if the file says so.
+    pub max_pressure: Option<MPa>,
+}
+
+/// How often what is done \[Hz\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rates {
+    /// Steps of the feedforward.
+    pub feedforward_hz: f64,
+    /// Steps of the control.
+    pub control_hz: f64,
+    /// Commands and reports.
+    pub io_hz: f64,
+}
+
+/// How commands are found.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Strategy {
+    /// One command.
+    Constant {
+        /// In the unit of the command.
+        value: f64,
+    },
+    /// Commands from a file.
+    Profile {
+        /// CSV with `time_s` and the command's column.
+        file: PathBuf,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Word {
+    Constant,
+    Profile,
+}
+
+/// The keys of a command's limits, which carry its unit.
+struct Keys {
+    value: &'static str,
+    min: &'static str,
+    max: &'static str,
+    rate: &'static str,
+}
+
+const fn keys(quantity: Quantity) -> Keys {
+    macro_rules! keys {
+        ($unit:literal) => {
+            Keys {
+                value: concat!("constant_", $unit),
+                min: concat!("min_", $unit),
+                max: concat!("max_", $unit),
+                rate: concat!("max_", $unit, "_per_s"),
+            }
+        };
+    }
+    match quantity {
+        Quantity::Rpm => keys!("rpm"),
+        Quantity::Volts => keys!("v"),
+        Quantity::Pressure => keys!("mpa"),
+        Quantity::Flow => keys!("mm3_per_s"),
+        Quantity::MassFlow => keys!("kg_per_s"),
+        Quantity::Filling => keys!("filling"),
+    }
+}
+
+impl Extruder {
+    /// Reads `[extruder]`.
+    pub fn read(table: &Table<'_>, folder: &Path) -> Option<Self> {
+        let quantity = table.required_choice("command", &Quantity::WORDS);
+        let limits = quantity.and_then(|quantity| read_limits(table, quantity));
+        let strategy = quantity.and_then(|quantity| read_strategy(table, folder, quantity, limits));
+        let height = table.number("layer_height_mm", 1e-3..=1e4);
+        let follows = table
+            .choice("follows", &[("robot", Follows::Robot), ("start_speed", Follows::StartSpeed)]);
+        let rates = read_rates(table);
+        let max_gap = table.number("max_gap_s", 0.01..=60.0);
+        let max_hold = table.number("max_hold_s", 0.1..=3600.0);
+        let max_pressure = table.optional_number("max_pressure_mpa", 1e-6..=1e4);
+        Some(Self {
+            quantity: quantity?,
+            limits: limits?,
+            strategy: strategy?,
+            layer_height: Mm::new(height?).ok()?,
+            follows: follows?,
+            rates: rates?,
+            max_gap: Span::from_secs(max_gap?),
+            max_hold: Span::from_secs(max_hold?),
+            max_pressure: max_pressure.and_then(|pressure| MPa::new(pressure).ok()),
+        })
+    }
+
+    /// The flow of a bead of this width at this speed; reports a bead that is
+    /// narrower than it is high.
+    pub fn demand(&self, table: &Table<'_>, width: Mm, speed: MmPerS) -> Option<FlowDemand> {
+        match section(width, self.layer_height) {
+            Ok(section) => Some(FlowDemand::new(section, speed, self.follows)),
+            Err(error) => {
+                table.report("layer_height_mm", self.layer_height.to_string(), error.to_string());
+                None
+            }
+        }
+    }
+
+    /// What the extruder side of a controller has to know, with the law that
+    /// the strategy came to.
+    pub fn setup(&self, law: Law) -> ExtruderSetup {
+        let period = |hz: f64| Span::from_secs(1.0 / hz);
+        ExtruderSetup {
+            quantity: self.quantity,
+            law,
+            limits: self.limits,
+            feedforward_period: period(self.rates.feedforward_hz),
+            control_period: period(self.rates.control_hz),
+            io_period: period(self.rates.io_hz),
+            max_gap: self.max_gap,
+            max_hold: self.max_hold,
+            max_pressure: self.max_pressure,
+        }
+    }
+}
+
+fn read_limits(table: &Table<'_>, quantity: Quantity) -> Option<CommandLimits> {
+    let keys = keys(quantity);
+    let min = table.number(keys.min, ANY);
+    let max = table.number(keys.max, ANY);
+    let rate = table.number(keys.rate, 1e-9..=1e12);
+    let (min, max) = (min?, max?);
+    if min >= max {
+        table.report(keys.max, max.to_string(), format!("more than {} = {min}", keys.min));
+        return None;
+    }
+    CommandLimits::new(min, max, rate?).ok()
+}
+
+fn read_strategy(
+    table: &Table<'_>,
+    folder: &Path,
+    quantity: Quantity,
+    limits: Option<CommandLimits>,
+) -> Option<Strategy> {
+    let words = [("constant", Word::Constant), ("profile", Word::Profile)];
+    match table.required_choice("strategy", &words)? {
+        Word::Constant => {
+            let key = keys(quantity).value;
+            let (low, high) = limits.map_or((f64::MIN, f64::MAX), |limits| limits.range());
+            table.number(key, low..=high).map(|value| Strategy::Constant { value })
+        }
+        Word::Profile => {
+            table.text("profile").map(|file| Strategy::Profile { file: folder.join(file) })
+        }
+    }
+}
+
+fn read_rates(table: &Table<'_>) -> Option<Rates> {
+    let hz = 0.5..=5000.0;
+    let feedforward = table.number_or("feedforward_rate_hz", hz.clone(), 200.0);
+    let control = table.number_or("control_rate_hz", hz.clone(), 20.0);
+    let io = table.number_or("io_rate_hz", hz, 50.0);
+    let rates = Rates { feedforward_hz: feedforward?, control_hz: control?, io_hz: io? };
+    for (key, rate) in [("control_rate_hz", rates.control_hz), ("io_rate_hz", rates.io_hz)] {
+        if rate > rates.feedforward_hz {
+            let most = format!("at most feedforward_rate_hz = {}", rates.feedforward_hz);
+            table.report(key, rate.to_string(), most);
+        }
+    }
+    Some(rates)
+}
+
+/// The simulated extruder of a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtruderPlant {
+    /// What turns commands into flow.
+    pub kind: PlantKind,
+    /// From the order to run until material moves.
+    pub start_delay: Span,
+    /// From the order to stop until nothing moves.
+    pub stop_delay: Span,
+    /// From the order to open or shut the valve until it has done so.
+    pub valve_delay: Span,
+}
+
+/// What turns commands into flow.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PlantKind {
+    /// Flow in proportion to the command.
+    Direct {
+        /// Flow for each unit of the command \[mm³/s\].
+        gain_mm3_per_s: f64,
+    },
+}
+
+impl ExtruderPlant {
+    /// Reads `[extruder_plant]`.
+    pub fn read(table: &Table<'_>) -> Option<Self> {
+        let kind = table.required_choice("kind", &[("direct", ())]).and_then(|()| {
+            table
+                .number("gain_mm3_per_s", 1e-9..=1e12)
+                .map(|gain_mm3_per_s| PlantKind::Direct { gain_mm3_per_s })
+        });
+        let delay = |key| table.number_or(key, 0.0..=60.0, 0.0).map(Span::from_secs);
+        let (start, stop) = (delay("start_delay_s"), delay("stop_delay_s"));
+        let valve = delay("valve_delay_s");
+        Some(Self { kind: kind?, start_delay: start?, stop_delay: stop?, valve_delay: valve? })
+    }
+}

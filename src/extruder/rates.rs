@@ -1,0 +1,74 @@
+//! Several rates in one loop: each says when it is due, and none waits for
+//! another.
+
+use crate::time::{Span, Stamp};
+
+/// Something that is done at a fixed rate. Times that were missed are left
+/// out, not made up for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rate {
+    period: Span,
+    next: Option<Stamp>,
+}
+
+impl Rate {
+    /// Every `period`; a period that is not positive is due at every call.
+    pub const fn every(period: Span) -> Self {
+        Self { period, next: None }
+    }
+
+    /// So many times a second \[Hz\].
+    pub fn hz(hz: f64) -> Self {
+        Self::every(Span::from_secs(1.0 / hz))
+    }
+
+    /// The time from one to the next.
+    pub const fn period(&self) -> Span {
+        self.period
+    }
+
+    /// Whether it is due at `now`; the first call is, and sets the grid.
+    pub fn due(&mut self, now: Stamp) -> bool {
+        let Some(mut next) = self.next else {
+            self.next = Some(now + self.period);
+            return true;
+        };
+        if now < next {
+            return false;
+        }
+        if self.period > Span::ZERO {
+            while next <= now {
+                next = next + self.period;
+            }
+        }
+        self.next = Some(next);
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_keep_their_grids_beside_each_other() {
+        let (mut fast, mut slow) = (Rate::hz(200.0), Rate::hz(20.0));
+        let (mut many, mut few) = (0, 0);
+        for tick in 0..1000_u32 {
+            let now = Stamp::from_secs(f64::from(tick) * 0.001);
+            many += u32::from(fast.due(now));
+            few += u32::from(slow.due(now));
+        }
+        assert_eq!((many, few), (200, 20));
+    }
+
+    #[test]
+    fn what_was_overslept_is_left_out() {
+        let mut rate = Rate::hz(10.0);
+        assert!(rate.due(Stamp::START));
+        assert!(!rate.due(Stamp::from_secs(0.09)));
+        assert!(rate.due(Stamp::from_secs(0.55)));
+        assert!(!rate.due(Stamp::from_secs(0.56)));
+        assert!(rate.due(Stamp::from_secs(0.60)));
+    }
+}

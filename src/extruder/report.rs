@@ -1,0 +1,53 @@
+//! What an extruder says of itself, and what it is told.
+
+use serde::{Deserialize, Serialize};
+
+use crate::units::{MPa, Mm, Mm3PerS, Rpm};
+
+/// What the pump of an extruder does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+pub enum PumpMode {
+    /// It stands.
+    Off,
+    /// It was told to run and material does not flow yet.
+    Starting,
+    /// It runs.
+    On,
+    /// It was told to stop and material still flows.
+    Stopping,
+    /// It stopped by a fault of its own.
+    Fault,
+}
+
+/// One report of an extruder. What it has no sensor for is absent.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ExtruderReport {
+    /// What the pump does.
+    pub pump: PumpMode,
+    /// Whether the shut-off valve is open; true where there is none.
+    pub valve_open: bool,
+    /// Speed of the screw.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub screw_rpm: Option<Rpm>,
+    /// Pressure at the nozzle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pressure_mpa: Option<MPa>,
+    /// Flow through the nozzle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flow_mm3_per_s: Option<Mm3PerS>,
+    /// Length of the screw that is filled, measured from the die's end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub filled_mm: Option<Mm>,
+}
+
+/// What is to be sent to the extruder.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ExtruderCommand {
+    /// Whether the pump is to run.
+    pub pump_on: bool,
+    /// Whether the shut-off valve is to be open.
+    pub valve_open: bool,
+    /// How much, in the unit of the cell's command.
+    pub value: f64,
+}

@@ -1,0 +1,306 @@
+//! The extruder side as a whole: when the pump runs and the valve is open,
+//! when the law commands, and what happens when something is missing. Like the
+//! width controller it is told what happened, and when.
+//!
+//! - off: no bead is laid.
+//! - starting: the pump was told to run; the law stands at the steady state of
+//!   the flow that is wanted.
+//! - running: the law commands, within its limits.
+//! - holding: the last command is kept, for a reason; left when the reason
+//!   goes, and a fault when it stays too long.
+//! - fault: the pump is stopped; left when the robot is idle again.
+
+use super::Quantity;
+use super::law::{Law, Wish};
+use super::limits::{CommandLimit, CommandLimits};
+use super::rates::Rate;
+use super::report::{ExtruderCommand, ExtruderReport, PumpMode};
+use super::state::{ExtruderFault, ExtruderHold, ExtruderState, ExtruderTrace};
+use crate::control::follow::{Follow, Verdict};
+use crate::time::{Span, Stamp};
+use crate::units::{MPa, Mm3PerS};
+
+/// Everything the extruder side has to know of its cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtruderSetup {
+    /// What is commanded.
+    pub quantity: Quantity,
+    /// The strategy.
+    pub law: Law,
+    /// What commands may be.
+    pub limits: CommandLimits,
+    /// Time from one step of the feedforward to the next; that of the ticks.
+    pub feedforward_period: Span,
+    /// Time from one step of the control to the next.
+    pub control_period: Span,
+    /// Time from one command to the next.
+    pub io_period: Span,
+    /// Longest time without a report over which the law goes on.
+    pub max_gap: Span,
+    /// Longest hold, and longest start, before the pump is stopped.
+    pub max_hold: Span,
+    /// Pressure at which the pump is stopped, if there is one.
+    pub max_pressure: Option<MPa>,
+}
+
+/// What the robot's side says at a tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Laying {
+    /// Bead is being laid, and this flow is wanted at the nozzle.
+    Bead(Mm3PerS),
+    /// The robot stopped where it should lay bead, or is being stopped.
+    Stopped,
+    /// Nothing is being done.
+    Idle,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Phase {
+    Off,
+    Starting { since: Stamp },
+    Running,
+    Holding { since: Stamp, why: ExtruderHold },
+    Fault(ExtruderFault),
+}
+
+/// The extruder side of a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Supervisor {
+    setup: ExtruderSetup,
+    phase: Phase,
+    link_up: bool,
+    report: Option<(Stamp, ExtruderReport)>,
+    follow: Follow,
+    io: Rate,
+    control: Rate,
+    ticked: Option<Stamp>,
+    controlled: Option<Stamp>,
+    applied: f64,
+    trace: ExtruderTrace,
+}
+
+impl Supervisor {
+    /// An extruder side that has heard nothing yet.
+    pub fn new(setup: ExtruderSetup) -> Self {
+        Self {
+            io: Rate::every(setup.io_period),
+            control: Rate::every(setup.control_period),
+            applied: setup.limits.idle(),
+            setup,
+            phase: Phase::Off,
+            link_up: false,
+            report: None,
+            follow: Follow::default(),
+            ticked: None,
+            controlled: None,
+            trace: ExtruderTrace::default(),
+        }
+    }
+
+    /// The state in words for outside.
+    pub const fn state(&self) -> ExtruderState {
+        match self.phase {
+            Phase::Off => ExtruderState::Off,
+            Phase::Starting { .. } => ExtruderState::Starting,
+            Phase::Running => ExtruderState::Running,
+            Phase::Holding { why, .. } => ExtruderState::Holding(why),
+            Phase::Fault(why) => ExtruderState::Fault(why),
+        }
+    }
+
+    /// The numbers behind the last command.
+    pub const fn trace(&self) -> ExtruderTrace {
+        self.trace
+    }
+
+    /// The time from one tick to the next.
+    pub const fn period(&self) -> Span {
+        self.setup.feedforward_period
+    }
+
+    /// The link to the extruder came up.
+    pub fn link_came_up(&mut self) {
+        self.link_up = true;
+    }
+
+    /// The link to the extruder was lost.
+    pub fn link_went_down(&mut self, now: Stamp) {
+        self.link_up = false;
+        self.report = None;
+        self.hold(now, ExtruderHold::LinkDown);
+    }
+
+    /// The extruder reported.
+    pub fn reported(&mut self, now: Stamp, report: &ExtruderReport) {
+        self.link_up = true;
+        self.report = Some((now, *report));
+        if self.phase == Phase::Off || matches!(self.phase, Phase::Fault(_)) {
+            return;
+        }
+        let too_high = |limit: MPa| report.pressure_mpa.is_some_and(|found| found > limit);
+        if self.setup.max_pressure.is_some_and(too_high) {
+            self.phase = Phase::Fault(ExtruderFault::Overpressure);
+            return;
+        }
+        match report.pump {
+            PumpMode::Fault => self.phase = Phase::Fault(ExtruderFault::Pump),
+            PumpMode::On => self.runs(now, report),
+            PumpMode::Starting => {}
+            PumpMode::Off | PumpMode::Stopping => {
+                if !matches!(self.phase, Phase::Starting { .. }) {
+                    self.phase = Phase::Fault(ExtruderFault::Pump);
+                }
+            }
+        }
+    }
+
+    /// It is time for a step of the feedforward. Gives a command when one is
+    /// due, and at once when the pump is to stop.
+    pub fn tick(&mut self, now: Stamp, laying: Laying) -> Option<ExtruderCommand> {
+        let dt = self.ticked.replace(now).map_or(Span::ZERO, |last| now - last);
+        let before = self.state();
+        match laying {
+            Laying::Bead(flow) => self.lay(now, dt, flow),
+            Laying::Stopped if matches!(self.phase, Phase::Fault(_)) => {}
+            Laying::Stopped | Laying::Idle => self.rest(),
+        }
+        let stopped = before != self.state()
+            && matches!(self.phase, Phase::Off | Phase::Fault(_))
+            && before != ExtruderState::Off;
+        (self.io.due(now) || stopped).then(|| self.command()).filter(|_| self.link_up)
+    }
+
+    /// The run is being ended: the pump stops now.
+    pub fn stop(&mut self) -> Option<ExtruderCommand> {
+        self.rest();
+        self.link_up.then(|| self.command())
+    }
+
+    fn command(&self) -> ExtruderCommand {
+        let on = !matches!(self.phase, Phase::Off | Phase::Fault(_));
+        // A valve that shuts on too high a pressure keeps it in.
+        let relieve = self.phase == Phase::Fault(ExtruderFault::Overpressure);
+        let value = if on { self.applied } else { self.setup.limits.idle() };
+        ExtruderCommand { pump_on: on, valve_open: on || relieve, value }
+    }
+
+    fn rest(&mut self) {
+        self.phase = Phase::Off;
+        self.applied = self.setup.limits.idle();
+        self.controlled = None;
+        self.follow.reset();
+        self.trace = ExtruderTrace::default();
+    }
+
+    fn lay(&mut self, now: Stamp, dt: Span, flow: Mm3PerS) {
+        self.trace.flow_mm3_per_s = flow;
+        if self.phase == Phase::Off {
+            self.begin(now, flow);
+        }
+        self.lose_patience(now);
+        if self.phase == Phase::Running {
+            self.drive(now, dt, flow);
+        }
+    }
+
+    /// Stands at the steady state of the flow that is wanted. The first
+    /// command of a bead is no change of another and has no rate.
+    fn begin(&mut self, now: Stamp, flow: Mm3PerS) {
+        self.phase = Phase::Starting { since: now };
+        let wish = self.setup.law.begin(flow);
+        let (low, high) = self.setup.limits.range();
+        self.applied = if wish.value.is_finite() {
+            wish.value.clamp(low, high)
+        } else {
+            self.setup.limits.idle()
+        };
+        self.note(wish, CommandLimit::None);
+        self.setup.law.settle(self.applied);
+    }
+
+    fn drive(&mut self, now: Stamp, dt: Span, flow: Mm3PerS) {
+        self.setup.law.foresee(dt, flow);
+        if self.control.due(now) {
+            let since = self.controlled.replace(now).map_or(Span::ZERO, |last| now - last);
+            let report = self.report.map(|(_, report)| report);
+            self.setup.law.answer(since, report.as_ref());
+        }
+        let wish = self.setup.law.wish();
+        let (applied, limit) = self.setup.limits.apply(wish.value, self.applied, dt);
+        self.applied = applied;
+        self.note(wish, limit);
+        self.setup.law.settle(applied);
+    }
+
+    fn note(&mut self, wish: Wish, limit: CommandLimit) {
+        self.trace.feedforward = finite(wish.feedforward);
+        self.trace.feedback = finite(wish.feedback);
+        self.trace.limit = limit;
+    }
+
+    /// The pump runs: a start is over, or the screw turns as it was told.
+    fn runs(&mut self, now: Stamp, report: &ExtruderReport) {
+        if matches!(self.phase, Phase::Starting { .. }) {
+            self.phase = Phase::Running;
+            self.controlled = None;
+        }
+        if self.setup.quantity == Quantity::Rpm
+            && let Some(turning) = report.screw_rpm
+        {
+            match self.follow.observe_share(now, turning.get(), self.applied) {
+                Verdict::Lost => self.phase = Phase::Fault(ExtruderFault::SpeedMismatch),
+                Verdict::Mismatch => self.hold(now, ExtruderHold::SpeedMismatch),
+                _ => self.resume_from(ExtruderHold::SpeedMismatch),
+            }
+        }
+        self.resume_from(ExtruderHold::LinkDown);
+        if self.has_what_is_needed(report) {
+            self.resume_from(ExtruderHold::NoReading);
+        }
+    }
+
+    fn has_what_is_needed(&self, report: &ExtruderReport) -> bool {
+        self.setup.law.needs().iter().all(|need| need.met_by(report))
+    }
+
+    /// Holds when reports stay out, and gives up when a hold or a start lasts
+    /// too long.
+    fn lose_patience(&mut self, now: Stamp) {
+        let heard = self.report.is_some_and(|(at, report)| {
+            now - at <= self.setup.max_gap && self.has_what_is_needed(&report)
+        });
+        match self.phase {
+            Phase::Running if !heard => self.hold(now, ExtruderHold::NoReading),
+            Phase::Starting { since } if now - since > self.setup.max_hold => {
+                self.phase = Phase::Fault(ExtruderFault::DidNotStart);
+            }
+            Phase::Holding { since, why } if now - since > self.setup.max_hold => {
+                self.phase = Phase::Fault(ExtruderFault::HeldTooLong(why));
+            }
+            _ => {}
+        }
+    }
+
+    /// Keeps the last command; a first reason stays.
+    fn hold(&mut self, now: Stamp, why: ExtruderHold) {
+        if self.phase == Phase::Running {
+            self.phase = Phase::Holding { since: now, why };
+        }
+    }
+
+    /// The reason for a hold has gone. The law goes on from the command that
+    /// was kept, for it has learned that one.
+    fn resume_from(&mut self, reason: ExtruderHold) {
+        if matches!(self.phase, Phase::Holding { why, .. } if why == reason) {
+            self.phase = Phase::Running;
+            self.controlled = None;
+        }
+    }
+}
+
+fn finite(value: f64) -> f64 {
+    if value.is_finite() { value } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,154 @@
+//! The extruder side of a run: what was wanted of the nozzle, what it was told,
+//! and what its sensors said.
+
+use maud::{Markup, html};
+
+use super::area::{Area, XAxis};
+use super::palette::{self, Ink};
+use super::plot::{Layer, Plot, y_range};
+use super::sections::legend;
+use super::series::Series;
+use super::strip::{Mark, Strip};
+use super::strips::{self, Row};
+use crate::control::{Event, Step};
+use crate::extruder::{ExtruderReport, ExtruderState, Quantity};
+use crate::offline::names;
+use crate::time::Stamp;
+use crate::units::Mm3PerS;
+
+/// What the plots of the extruder side are drawn from.
+#[derive(Debug, Default)]
+pub struct ExtruderCharts {
+    wanted: Series,
+    flow: Series,
+    command: Series,
+    feedforward: Series,
+    screw: Series,
+    pressure: Series,
+    filled: Series,
+    states: Strip,
+    limits: Strip,
+}
+
+impl ExtruderCharts {
+    /// A step of the controller.
+    pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
+        let time = now.secs();
+        if let Event::Extruder(report) = event {
+            self.report(time, report);
+        }
+        let Some(side) = &step.extruder else { return };
+        let severity = match side.state {
+            ExtruderState::Off => 0,
+            ExtruderState::Running => 1,
+            ExtruderState::Starting => 2,
+            ExtruderState::Holding(_) => 3,
+            ExtruderState::Fault(_) => 4,
+        };
+        self.states.push(time, Mark { severity, name: side.state.name() });
+        let limit = names::command_limit(side.trace.limit);
+        self.limits.push(time, Mark { severity: u8::from(limit != "none"), name: limit });
+        if let Some(command) = side.command {
+            self.command.push(time, command.value);
+            self.wanted.push(time, side.trace.flow_mm3_per_s.get());
+            self.feedforward.push(time, side.trace.feedforward);
+        }
+    }
+
+    /// The true flow, where a simulation knows it.
+    pub fn flow(&mut self, now: Stamp, flow: Mm3PerS) {
+        self.flow.push(now.secs(), flow.get());
+    }
+
+    fn report(&mut self, time: f64, report: &ExtruderReport) {
+        let push = |series: &mut Series, value: Option<f64>| {
+            if let Some(value) = value {
+                series.push(time, value);
+            }
+        };
+        push(&mut self.screw, report.screw_rpm.map(f64::from));
+        push(&mut self.pressure, report.pressure_mpa.map(f64::from));
+        push(&mut self.filled, report.filled_mm.map(f64::from));
+    }
+
+    /// The section of the page, for an extruder that is told this quantity.
+    pub fn section(&self, quantity: Quantity) -> Markup {
+        let Some(range) = self.command.extent() else { return html! {} };
+        let axis = XAxis::time(range);
+        let told = format!("command [{}]", quantity.symbol());
+        html! {
+            section {
+                h2 { "The extruder" }
+                (self.flow_plot(&axis))
+                (strips::draw(&axis, &[
+                    Row { name: "state", strip: &self.states, ink: palette::state },
+                    Row { name: "limit", strip: &self.limits, ink: limit },
+                ]))
+                (self.command_plot(&axis, &told, quantity == Quantity::Rpm))
+                (sensor(&axis, &self.pressure, "pressure [MPa]", palette::PRESSURE))
+                @if quantity != Quantity::Rpm {
+                    (sensor(&axis, &self.screw, "screw [rpm]", palette::SCREW))
+                }
+                (sensor(&axis, &self.filled, "filled length [mm]", palette::MODEL))
+            }
+        }
+    }
+
+    fn flow_plot(&self, axis: &XAxis) -> Markup {
+        let plot = Plot {
+            area: Area::wide(240.0),
+            x: axis,
+            y_title: "flow [mm³/s]",
+            y_range: y_range(&[&self.wanted, &self.flow], &[0.0]),
+            layers: vec![
+                Layer::Wish(&self.wanted, palette::TARGET),
+                Layer::Curve(&self.flow, palette::FLOW),
+            ],
+        };
+        html! {
+            (legend(&[("wanted", palette::TARGET, "dash"), ("at the nozzle", palette::FLOW, "")]))
+            (plot.draw())
+        }
+    }
+
+    fn command_plot(&self, axis: &XAxis, title: &str, with_screw: bool) -> Markup {
+        let mut layers = vec![
+            Layer::Wish(&self.feedforward, palette::DEMAND),
+            Layer::Stairs(&self.command, palette::SETPOINT),
+        ];
+        let mut shown = vec![&self.command];
+        let mut entries =
+            vec![("command", palette::SETPOINT, ""), ("known beforehand", palette::DEMAND, "dash")];
+        if with_screw {
+            layers.push(Layer::Curve(&self.screw, palette::SCREW));
+            shown.push(&self.screw);
+            entries.push(("screw", palette::SCREW, ""));
+        }
+        let plot = Plot {
+            area: Area::wide(220.0),
+            x: axis,
+            y_title: title,
+            y_range: y_range(&shown, &[0.0]),
+            layers,
+        };
+        html! { (legend(&entries)) (plot.draw()) }
+    }
+}
+
+fn sensor(axis: &XAxis, series: &Series, title: &str, ink: Ink) -> Markup {
+    if series.is_empty() {
+        return html! {};
+    }
+    let plot = Plot {
+        area: Area::wide(200.0),
+        x: axis,
+        y_title: title,
+        y_range: y_range(&[series], &[0.0]),
+        layers: vec![Layer::Curve(series, ink)],
+    };
+    plot.draw()
+}
+
+fn limit(name: &str) -> Option<Ink> {
+    (name != "none").then_some(palette::LIMIT)
+}

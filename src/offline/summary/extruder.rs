@@ -1,0 +1,109 @@
+//! The part of the summary that only a run whose extruder is commanded has.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::control::{Event, Step};
+use crate::extruder::{CommandLimit, ExtruderFault, ExtruderState};
+use crate::offline::names;
+use crate::offline::stats::Moments;
+use crate::time::{Span, Stamp};
+use crate::units::Mm3PerS;
+
+/// What the extruder side came to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ExtruderSummary {
+    /// Commands that were given.
+    pub commands: u64,
+    /// Time in each state.
+    pub states_s: BTreeMap<&'static str, f64>,
+    /// Time for which the last command was kept, for each reason.
+    pub held_for_s: BTreeMap<&'static str, f64>,
+    /// Time during which a limit shaped the command, for each limit.
+    pub limited_by_s: BTreeMap<&'static str, f64>,
+    /// Why the extruder was stopped, and how often.
+    pub fault_reasons: BTreeMap<String, u64>,
+    /// Root mean square of flow less wanted flow while bead was laid, where a
+    /// simulation knows the flow or a sensor tells it.
+    pub flow_error_rms_mm3_per_s: Option<f64>,
+    /// Mean of that flow.
+    pub flow_mean_mm3_per_s: Option<f64>,
+}
+
+/// Adds up what the extruder side did.
+#[derive(Debug, Default)]
+pub struct ExtruderTally {
+    commands: u64,
+    last: Option<(Stamp, ExtruderState, CommandLimit)>,
+    states: BTreeMap<&'static str, Span>,
+    held_for: BTreeMap<&'static str, Span>,
+    limited_by: BTreeMap<&'static str, Span>,
+    fault_reasons: BTreeMap<String, u64>,
+    error: Moments,
+    flow: Moments,
+}
+
+impl ExtruderTally {
+    pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
+        let Some(side) = &step.extruder else { return };
+        self.commands += u64::from(side.command.is_some());
+        if let Some((since, state, limit)) = self.last {
+            self.spend(now - since, state, limit);
+        }
+        if let ExtruderState::Fault(why) = side.state
+            && !matches!(self.last, Some((_, ExtruderState::Fault(_), _)))
+        {
+            self.count(why);
+        }
+        self.last = Some((now, side.state, side.trace.limit));
+        if let Event::Extruder(report) = event
+            && side.state == ExtruderState::Running
+            && let Some(flow) = report.flow_mm3_per_s
+        {
+            self.flow(Some(side.trace.flow_mm3_per_s), flow);
+        }
+    }
+
+    pub fn flow(&mut self, wanted: Option<Mm3PerS>, flow: Mm3PerS) {
+        if let Some(wanted) = wanted {
+            self.error.add((flow - wanted).get());
+            self.flow.add(flow.get());
+        }
+    }
+
+    /// None where no extruder was commanded.
+    pub fn finish(&self) -> Option<ExtruderSummary> {
+        self.last?;
+        let seconds = |times: &BTreeMap<&'static str, Span>| {
+            times.iter().map(|(name, span)| (*name, span.secs())).collect()
+        };
+        Some(ExtruderSummary {
+            commands: self.commands,
+            states_s: seconds(&self.states),
+            held_for_s: seconds(&self.held_for),
+            limited_by_s: seconds(&self.limited_by),
+            fault_reasons: self.fault_reasons.clone(),
+            flow_error_rms_mm3_per_s: self.error.rms(),
+            flow_mean_mm3_per_s: self.flow.mean(),
+        })
+    }
+
+    fn spend(&mut self, span: Span, state: ExtruderState, limit: CommandLimit) {
+        let add = |times: &mut BTreeMap<&'static str, Span>, name| {
+            let sum = times.entry(name).or_default();
+            *sum = *sum + span;
+        };
+        add(&mut self.states, state.name());
+        if let ExtruderState::Holding(why) = state {
+            add(&mut self.held_for, names::extruder_hold(why));
+        }
+        if limit != CommandLimit::None {
+            add(&mut self.limited_by, names::command_limit(limit));
+        }
+    }
+
+    fn count(&mut self, why: ExtruderFault) {
+        *self.fault_reasons.entry(names::extruder_fault(why)).or_default() += 1;
+    }
+}

@@ -1,0 +1,189 @@
+//! The simulated extruder: a pump that starts and stops with delays, a shut-off
+//! valve, and behind them a plant that turns commands into flow.
+
+use crate::config::extruder::{ExtruderPlant, PlantKind};
+use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
+use crate::ports::ExtruderPort;
+use crate::time::{Span, Stamp};
+use crate::units::Mm3PerS;
+
+pub mod direct;
+
+pub use direct::Direct;
+
+/// Step of a simulated plant.
+const STEP: Span = Span::from_millis(1);
+
+/// What turns commands into flow.
+pub trait Plant: std::fmt::Debug + Send {
+    /// Goes on by a time with a command, in the command's unit.
+    fn advance(&mut self, command: f64, dt: Span);
+
+    /// Flow that it would give through an open nozzle.
+    fn flow(&self) -> Mm3PerS;
+
+    /// Adds what its sensors read to a report.
+    fn sense(&mut self, report: &mut ExtruderReport);
+}
+
+/// Delays of pump and valve.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Delays {
+    /// From the order to run until material moves.
+    pub start: Span,
+    /// From the order to stop until nothing moves.
+    pub stop: Span,
+    /// From the order to open or shut the valve until it has done so.
+    pub valve: Span,
+}
+
+/// A two-way device that does what it was told after a while.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Switch {
+    on: bool,
+    told: bool,
+    at: Stamp,
+}
+
+impl Switch {
+    const fn new() -> Self {
+        Self { on: false, told: false, at: Stamp::START }
+    }
+
+    fn tell(&mut self, now: Stamp, on: bool, delay: Span) {
+        if on != self.told {
+            (self.told, self.at) = (on, now + delay);
+        }
+    }
+
+    fn advance(&mut self, now: Stamp) {
+        if now >= self.at {
+            self.on = self.told;
+        }
+    }
+}
+
+/// An extruder in simulated time.
+#[derive(Debug)]
+pub struct SimExtruder {
+    plant: Box<dyn Plant>,
+    delays: Delays,
+    step: Span,
+    pump: Switch,
+    valve: Switch,
+    value: f64,
+    now: Stamp,
+}
+
+impl SimExtruder {
+    /// At rest, with a plant that is advanced by `step` at a time.
+    pub fn new(plant: Box<dyn Plant>, delays: Delays, step: Span) -> Self {
+        let (pump, valve) = (Switch::new(), Switch::new());
+        Self { plant, delays, step, pump, valve, value: 0.0, now: Stamp::START }
+    }
+
+    /// As a cell describes it.
+    pub fn of(plant: &ExtruderPlant) -> Self {
+        let delays =
+            Delays { start: plant.start_delay, stop: plant.stop_delay, valve: plant.valve_delay };
+        let kind: Box<dyn Plant> = match plant.kind {
+            PlantKind::Direct { gain_mm3_per_s } => Box::new(Direct::new(gain_mm3_per_s)),
+        };
+        Self::new(kind, delays, STEP)
+    }
+
+    /// Goes on to a moment.
+    pub fn advance(&mut self, now: Stamp) {
+        while self.now + self.step <= now {
+            self.now = self.now + self.step;
+            self.pump.advance(self.now);
+            self.valve.advance(self.now);
+            let command = if self.pump.on { self.value } else { 0.0 };
+            self.plant.advance(command, self.step);
+        }
+    }
+
+    /// Flow through the nozzle at the moment it was advanced to.
+    pub fn flow(&self) -> Mm3PerS {
+        if self.valve.on { self.plant.flow() } else { Mm3PerS::ZERO }
+    }
+
+    /// What it reports.
+    pub fn report(&mut self) -> ExtruderReport {
+        let pump = match (self.pump.told, self.pump.on) {
+            (true, true) => PumpMode::On,
+            (true, false) => PumpMode::Starting,
+            (false, true) => PumpMode::Stopping,
+            (false, false) => PumpMode::Off,
+        };
+        let mut report = ExtruderReport {
+            pump,
+            valve_open: self.valve.on,
+            screw_rpm: None,
+            pressure_mpa: None,
+            flow_mm3_per_s: None,
+            filled_mm: None,
+        };
+        self.plant.sense(&mut report);
+        report
+    }
+}
+
+impl ExtruderPort for SimExtruder {
+    fn send(&mut self, now: Stamp, command: ExtruderCommand) -> bool {
+        self.advance(now);
+        let pump_delay = if command.pump_on { self.delays.start } else { self.delays.stop };
+        self.pump.tell(now, command.pump_on, pump_delay);
+        self.valve.tell(now, command.valve_open, self.delays.valve);
+        self.value = command.value;
+        // What needs no time is done at once.
+        self.pump.advance(now);
+        self.valve.advance(now);
+        true
+    }
+}
+
+/// An extruder or none, where a cell may have one.
+impl ExtruderPort for Option<SimExtruder> {
+    fn send(&mut self, now: Stamp, command: ExtruderCommand) -> bool {
+        self.as_mut().is_some_and(|extruder| extruder.send(now, command))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn extruder() -> SimExtruder {
+        let delays = Delays {
+            start: Span::from_millis(300),
+            stop: Span::from_millis(200),
+            valve: Span::from_millis(50),
+        };
+        SimExtruder::new(Box::new(Direct::new(10.0)), delays, Span::from_millis(1))
+    }
+
+    fn flow_at(extruder: &mut SimExtruder, secs: f64) -> f64 {
+        extruder.advance(Stamp::from_secs(secs));
+        extruder.flow().get()
+    }
+
+    #[test]
+    fn pump_and_valve_take_their_time() {
+        let mut extruder = extruder();
+        let on = ExtruderCommand { pump_on: true, valve_open: true, value: 5.0 };
+        assert!(extruder.send(Stamp::START, on));
+        assert_eq!(extruder.report().pump, PumpMode::Starting);
+        assert_eq!(flow_at(&mut extruder, 0.29), 0.0);
+        assert!(extruder.report().valve_open);
+        assert_eq!(flow_at(&mut extruder, 0.302), 50.0);
+        assert_eq!(extruder.report().pump, PumpMode::On);
+        let off = ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 };
+        assert!(extruder.send(Stamp::from_secs(1.0), off));
+        assert_eq!(extruder.report().pump, PumpMode::Stopping);
+        assert_eq!(flow_at(&mut extruder, 1.06), 0.0);
+        assert_eq!(extruder.report().pump, PumpMode::Stopping);
+        assert_eq!(flow_at(&mut extruder, 1.21), 0.0);
+        assert_eq!(extruder.report().pump, PumpMode::Off);
+    }
+}
