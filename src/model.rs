@@ -1,2 +1,25 @@
 //! Linear models of an extruder: transfer functions in continuous time with
 //! dead time, what they are on a grid of samples, and their simulation.
+//!
+//! ```text
+//! process::{FirstOrder, SecondOrder} → TransferFunction
+//!   → discretise(dt, Method) → DiscreteTransfer → Recursion::step(u) → y
+//!   → Simulator::new(tf, dt, Between) → step(u) → y      (exact, any dead time)
+//!   → margins(loop)
+//! ```
+//!
+//! Coefficients are given with the highest power first, times in seconds.
+
+mod discrete;
+mod margins;
+pub mod polynomial;
+mod process;
+mod simulate;
+mod state;
+mod transfer;
+
+pub use discrete::{DiscreteTransfer, Method, Recursion};
+pub use margins::{Margins, margins};
+pub use process::{FirstOrder, SecondOrder};
+pub use simulate::{Between, Simulator, simulate};
+pub use transfer::{ModelError, TransferFunction};

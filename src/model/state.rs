@@ -1,0 +1,78 @@
+//! States of a transfer function, and how they move on while its input is
+//! constant or changes evenly.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::polynomial::mean_size_of_roots;
+use super::transfer::{ModelError, TransferFunction};
+
+/// x' = A·x + B·u, y = C·x + D·u: the controllable form in units of the poles'
+/// mean size, so that its matrices stay of order one.
+#[derive(Debug, Clone)]
+pub(super) struct StateSpace {
+    pub a: DMatrix<f64>,
+    pub b: DVector<f64>,
+    pub c: DVector<f64>,
+    pub d: f64,
+}
+
+/// How a state moves on over a time h: x(h) = Φ·x(0) + constant·u(0) +
+/// slope·u'(0) with an input that is a straight line.
+pub(super) struct Advance {
+    pub state: DMatrix<f64>,
+    pub constant: DVector<f64>,
+    pub slope: DVector<f64>,
+}
+
+impl StateSpace {
+    pub fn of(tf: &TransferFunction) -> Self {
+        let order = tf.order();
+        let (num, den) = (tf.num(), tf.den());
+        let size = mean_size_of_roots(den);
+        let lead = den[0];
+        let missing = den.len() - num.len();
+        let padded = |i: usize| i.checked_sub(missing).map_or(0.0, |i| num[i]) / lead;
+        let d = padded(0);
+        let (mut a, mut b) = (DMatrix::zeros(order, order), DVector::zeros(order));
+        let mut c = DVector::zeros(order);
+        let mut unit = 1.0;
+        for i in 0..order {
+            unit *= size;
+            let pole = den[i + 1] / lead;
+            a[(0, i)] = -pole / unit * size;
+            c[i] = (padded(i + 1) - d * pole) / unit;
+            if i > 0 {
+                a[(i, i - 1)] = size;
+            }
+        }
+        if order > 0 {
+            b[0] = size;
+        }
+        Self { a, b, c, d }
+    }
+
+    /// Exact, by one exponential of the states with the input and its slope
+    /// appended (Van Loan 1978).
+    pub fn advance(&self, h: f64) -> Advance {
+        let n = self.b.len();
+        let mut joined = DMatrix::zeros(n + 2, n + 2);
+        joined.view_mut((0, 0), (n, n)).copy_from(&(&self.a * h));
+        joined.view_mut((0, n), (n, 1)).copy_from(&(&self.b * h));
+        joined[(n, n + 1)] = h;
+        let joined = joined.exp();
+        Advance {
+            state: joined.view((0, 0), (n, n)).into_owned(),
+            constant: joined.view((0, n), (n, 1)).column(0).into_owned(),
+            slope: joined.view((0, n + 1), (n, 1)).column(0).into_owned(),
+        }
+    }
+
+    /// The state in which an input of one keeps it. Fails for an integrator.
+    pub fn steady(&self) -> Result<DVector<f64>, ModelError> {
+        if self.b.is_empty() {
+            return Ok(self.b.clone());
+        }
+        let steady = self.a.clone().lu().solve(&(-&self.b));
+        steady.filter(|x| x.iter().all(|v| v.is_finite())).ok_or(ModelError::NoSteadyState)
+    }
+}
