@@ -1,2 +1,4 @@
 //! Models of an extruder from logged data: what to excite it with, how the
 //! data are cleaned and aligned, and how models are fitted to them.
+
+pub mod prbs;
