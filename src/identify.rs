@@ -1,4 +1,10 @@
 //! Models of an extruder from logged data: what to excite it with, how the
 //! data are cleaned and aligned, and how models are fitted to them.
 
+pub mod align;
+pub mod excitation;
+pub mod flow;
+pub mod hampel;
 pub mod prbs;
+pub mod profile;
+pub mod savgol;

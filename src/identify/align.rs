@@ -1,0 +1,155 @@
+//! Measured is not extruded: a bead is measured some way behind the nozzle.
+//! In time that way changes with the speed, in position it is constant
+//! (bcs-thesis, 3.1.2 and table 2). Add the offset to each position, look ahead
+//! for the two samples that bracket the sum, and interpolate what was measured
+//! between them.
+
+/// Samples that cannot be aligned. Counted from 1.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum AlignError {
+    /// Columns of different length.
+    #[error("{positions} positions and {measured} measured values: expected one of each a sample")]
+    Length {
+        /// Positions.
+        positions: usize,
+        /// Measured values.
+        measured: usize,
+    },
+    /// The place of measurement lies before the nozzle.
+    #[error("an offset of {offset}: expected the way from nozzle to measurement, 0 or more")]
+    Offset {
+        /// What was told.
+        offset: f64,
+    },
+    /// A position that is less than the one before.
+    #[error(
+        "the position falls from {before} to {position} at sample {at}: expected one that only \
+         grows; turn its sign, or use one bead alone"
+    )]
+    Falls {
+        /// Which one.
+        at: usize,
+        /// Position there.
+        position: f64,
+        /// Position before.
+        before: f64,
+    },
+    /// A number that is none.
+    #[error("the position of sample {at} is {position}")]
+    NotFinite {
+        /// Which one.
+        at: usize,
+        /// What it is.
+        position: f64,
+    },
+}
+
+/// What was measured, at the moments of extrusion: for each sample the value
+/// that was measured once its material had come `offset` further, in the unit
+/// of the positions (mm, or clicks of an encoder). `None` at the end, where the
+/// material has not come that far.
+pub fn to_extruded(
+    positions: &[f64],
+    measured: &[f64],
+    offset: f64,
+) -> Result<Vec<Option<f64>>, AlignError> {
+    check(positions, measured, offset)?;
+    let mut ahead = 0;
+    let mut next = |position: f64| {
+        let desired = position + offset;
+        // Positions only grow, and so does what is looked for.
+        while positions.get(ahead).is_some_and(|there| *there < desired) {
+            ahead += 1;
+        }
+        let (there, value) = (*positions.get(ahead)?, *measured.get(ahead)?);
+        let bracket = ahead.checked_sub(1);
+        let before = bracket.and_then(|k| Some((*positions.get(k)?, *measured.get(k)?)));
+        match before {
+            Some((here, was)) if there > here && there > desired => {
+                Some(was + (value - was) * (desired - here) / (there - here))
+            }
+            _ => Some(value),
+        }
+    };
+    Ok(positions.iter().map(|position| next(*position)).collect())
+}
+
+fn check(positions: &[f64], measured: &[f64], offset: f64) -> Result<(), AlignError> {
+    if positions.len() != measured.len() {
+        return Err(AlignError::Length { positions: positions.len(), measured: measured.len() });
+    }
+    if !(offset >= 0.0 && offset.is_finite()) {
+        return Err(AlignError::Offset { offset });
+    }
+    let mut before = f64::NEG_INFINITY;
+    for (at, &position) in (1..).zip(positions) {
+        if !position.is_finite() {
+            return Err(AlignError::NotFinite { at, position });
+        }
+        if position < before {
+            return Err(AlignError::Falls { at, position, before });
+        }
+        before = position;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+
+    #[test]
+    fn the_thesis_example() {
+        // Table 2: 10,000 clicks ahead of the sample lies between those at 0.235 s and 0.240 s.
+        let positions = [0.0, 9_900.0, 10_100.0, 19_950.0, 20_150.0];
+        let area = [1.0, 40.0, 44.0, 50.0, 58.0];
+        let extruded = to_extruded(&positions, &area, 10_000.0).unwrap();
+        assert_eq!(extruded[0], Some(42.0));
+        // 19,900 lies between 10,100 and 19,950.
+        assert!((extruded[1].unwrap() - (44.0 + 6.0 * 9_800.0 / 9_850.0)).abs() < 1e-12);
+        assert_eq!(extruded[2], Some(50.0 + 8.0 * 150.0 / 200.0));
+        assert_eq!(extruded[3..], [None, None]);
+    }
+
+    #[test]
+    fn the_way_is_constant_where_the_time_is_not() {
+        // A wheel whose speed doubles and halves; what passes the nozzle at the position p is
+        // measured 30 mm later.
+        let laid = |p: f64| 40.0 + 5.0 * (p / 25.0).sin();
+        let mut positions = vec![0.0];
+        for k in 0_u32..4000 {
+            let speed = 30.0 + 15.0 * (f64::from(k) * 0.005).sin();
+            positions.push(positions.last().unwrap() + speed * 0.005);
+        }
+        let measured: Vec<f64> = positions.iter().map(|p| laid(p - 30.0)).collect();
+        let extruded = to_extruded(&positions, &measured, 30.0).unwrap();
+        let end = positions.last().unwrap() - 30.0;
+        for (position, value) in positions.iter().zip(extruded) {
+            assert_eq!(value.is_none(), *position > end);
+            assert!(value.is_none_or(|value| (value - laid(*position)).abs() < 1e-4));
+        }
+    }
+
+    #[test]
+    fn a_wheel_at_rest_gives_what_it_stopped_with() {
+        let positions = [0.0, 1.0, 1.0, 1.0, 2.0, 3.0];
+        let measured = [10.0, 20.0, 21.0, 22.0, 30.0, 40.0];
+        let extruded = to_extruded(&positions, &measured, 1.0).unwrap();
+        assert_eq!(
+            extruded,
+            [20.0, 30.0, 30.0, 30.0, 40.0].map(Some).into_iter().chain([None]).collect::<Vec<_>>()
+        );
+        assert_eq!(to_extruded(&positions[3..], &measured[3..], 0.0).unwrap()[0], Some(22.0));
+    }
+
+    #[test]
+    fn what_cannot_be_aligned_is_told() {
+        let fell = to_extruded(&[0.0, 2.0, 1.0], &[0.0; 3], 1.0).unwrap_err();
+        assert!(fell.to_string().contains("falls from 2 to 1 at sample 3"), "{fell}");
+        assert!(matches!(to_extruded(&[0.0], &[], 1.0), Err(AlignError::Length { .. })));
+        assert!(to_extruded(&[0.0], &[1.0], -1.0).is_err());
+        assert!(to_extruded(&[f64::NAN], &[1.0], 1.0).is_err());
+    }
+}

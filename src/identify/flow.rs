@@ -1,0 +1,64 @@
+//! The flow at the nozzle from the bead that it left: surface speed times area,
+//! both of the moment of extrusion (bcs-thesis, eq. (20)).
+
+use super::align::{AlignError, to_extruded};
+
+/// What was logged of a bead, a value each a sample.
+#[derive(Debug, Clone, Copy)]
+pub struct Logged<'a> {
+    /// Way of the surface below the nozzle \[mm\]; only grows.
+    pub position_mm: &'a [f64],
+    /// Its speed \[mm/s\].
+    pub speed_mm_per_s: &'a [f64],
+    /// Area of the section that is being measured \[mm²\].
+    pub area_mm2: &'a [f64],
+    /// Way from the nozzle to where it is measured \[mm\].
+    pub offset_mm: f64,
+}
+
+/// Flow \[mm³/s\] at the moments of the samples. Shorter than the log by those
+/// whose material has not been measured when it ends.
+pub fn extruded(logged: &Logged<'_>) -> Result<Vec<f64>, AlignError> {
+    let areas = to_extruded(logged.position_mm, logged.area_mm2, logged.offset_mm)?;
+    let pairs = logged.speed_mm_per_s.iter().zip(areas);
+    Ok(pairs.map_while(|(speed, area)| Some(speed * area?)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+
+    #[test]
+    fn the_flow_that_laid_a_bead_is_found_again() {
+        // Flow and speed change at rates of their own; the area is their quotient.
+        let flow = |t: f64| 1500.0 + 300.0 * (1.3 * t).sin();
+        let speed = |t: f64| 35.0 + 10.0 * (0.7 * t).cos();
+        let way = |t: f64| 35.0 * t + 10.0 / 0.7 * (0.7 * t).sin();
+        let times: Vec<f64> = (0_u32..6000).map(|k| f64::from(k) * 0.005).collect();
+        // The moment at which the material at a position left the nozzle, by bisection.
+        let left = |position: f64| {
+            let halve = |(low, high): (f64, f64), _| {
+                let middle = f64::midpoint(low, high);
+                if way(middle) < position { (middle, high) } else { (low, middle) }
+            };
+            (0..60).fold((-5.0, 40.0), halve).0
+        };
+        let position_mm: Vec<f64> = times.iter().map(|t| way(*t)).collect();
+        let speed_mm_per_s: Vec<f64> = times.iter().map(|t| speed(*t)).collect();
+        let area_at = |position: f64| flow(left(position - 40.0)) / speed(left(position - 40.0));
+        let area_mm2: Vec<f64> = position_mm.iter().map(|p| area_at(*p)).collect();
+        let logged = Logged {
+            position_mm: &position_mm,
+            speed_mm_per_s: &speed_mm_per_s,
+            area_mm2: &area_mm2,
+            offset_mm: 40.0,
+        };
+        let found = extruded(&logged).unwrap();
+        assert!(found.len() > 5700 && found.len() < 6000, "{}", found.len());
+        for (time, found) in times.iter().zip(found) {
+            assert!((found - flow(*time)).abs() < 0.01, "{time} s: {found}");
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! Smoothing without a shift: a polynomial fitted to a window by least squares
+//! and evaluated at one of its samples (bcs-thesis, eqs. (5), (6); Savitzky and
+//! Golay 1964). The coefficients are sums over orthonormal polynomials, so no
+//! matrix is solved and none of them suffers from the powers of a long window.
+
+/// Highest degree that is of use.
+const MAX_DEGREE: usize = 8;
+/// Windows beyond this are no windows.
+const MAX_WINDOW: usize = 10_001;
+
+/// Numbers that make no filter.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum SavGolError {
+    /// The window's length.
+    #[error(
+        "a window of {window} samples for a polynomial of degree {degree}: expected an odd number \
+         from {} to {MAX_WINDOW}", (*degree + 1) | 1
+    )]
+    Window {
+        /// What was asked for.
+        window: usize,
+        /// The polynomial's degree.
+        degree: usize,
+    },
+    /// The polynomial's degree.
+    #[error("a polynomial of degree {degree}: expected 0 to {MAX_DEGREE}")]
+    Degree {
+        /// What was asked for.
+        degree: usize,
+    },
+    /// The derivative's order.
+    #[error("derivative {derivative} of a polynomial of degree {degree} is nothing")]
+    Derivative {
+        /// What was asked for.
+        derivative: usize,
+        /// The polynomial's degree.
+        degree: usize,
+    },
+    /// Time from sample to sample.
+    #[error("{step_s} s from sample to sample: expected a time larger than zero")]
+    Step {
+        /// What was asked for.
+        step_s: f64,
+    },
+    /// Fewer samples than the window is long.
+    #[error("{got} samples: a window of {window} needs as many")]
+    TooFew {
+        /// Samples that there are.
+        got: usize,
+        /// The window's length.
+        window: usize,
+    },
+}
+
+/// A window, the degree of the polynomial, and which derivative is wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SavGol {
+    window: usize,
+    degree: usize,
+    derivative: usize,
+    step_s: f64,
+}
+
+impl SavGol {
+    /// That smooths: an odd window, a degree below its length.
+    pub fn new(window: usize, degree: usize) -> Result<Self, SavGolError> {
+        if degree > MAX_DEGREE {
+            return Err(SavGolError::Degree { degree });
+        }
+        if window.is_multiple_of(2) || window <= degree || window > MAX_WINDOW {
+            return Err(SavGolError::Window { window, degree });
+        }
+        Ok(Self { window, degree, derivative: 0, step_s: 1.0 })
+    }
+
+    /// That differentiates so many times, at so many seconds a sample.
+    pub fn derivative(self, order: usize, step_s: f64) -> Result<Self, SavGolError> {
+        if order > self.degree {
+            return Err(SavGolError::Derivative { derivative: order, degree: self.degree });
+        }
+        if !(step_s > 0.0 && step_s.is_finite()) {
+            return Err(SavGolError::Step { step_s });
+        }
+        Ok(Self { derivative: order, step_s, ..self })
+    }
+
+    /// Samples of the window.
+    pub fn window(&self) -> usize {
+        self.window
+    }
+
+    /// What each sample of the window, the oldest first, is multiplied by to get
+    /// the value at sample `at` of it, counted from 0.
+    pub fn coefficients(&self, at: usize) -> Vec<f64> {
+        // The window reaches from −1 to 1.
+        let half = as_f64(self.window / 2).max(1.0);
+        let place = |sample: usize| (as_f64(sample) - as_f64(self.window / 2)) / half;
+        let mut coefficients = vec![0.0; self.window];
+        let mut basis = Basis::new((0..self.window).map(place).collect());
+        let mut there = Derivatives::new(place(at), 1.0 / as_f64(self.window).sqrt());
+        for degree in 0..=self.degree {
+            if degree > 0 {
+                there.advance(basis.advance());
+            }
+            let wanted = there.of_order(self.derivative);
+            for (coefficient, value) in coefficients.iter_mut().zip(&basis.values) {
+                *coefficient += wanted * value;
+            }
+        }
+        let order = i32::try_from(self.derivative).unwrap_or(0);
+        let scale = (half * self.step_s).powi(-order);
+        for coefficient in &mut coefficients {
+            *coefficient *= scale;
+        }
+        coefficients
+    }
+
+    /// Variance of the value at sample `at` of the window for samples with
+    /// independent noise of variance 1.
+    pub fn noise_gain(&self, at: usize) -> f64 {
+        self.coefficients(at).iter().map(|coefficient| coefficient * coefficient).sum()
+    }
+
+    /// As many values as samples: at the middle of each window, and at the ends
+    /// from the polynomial through the first and the last window.
+    pub fn filter(&self, samples: &[f64]) -> Result<Vec<f64>, SavGolError> {
+        let (got, window) = (samples.len(), self.window);
+        let (Some(first), Some(last)) =
+            (samples.get(..window), got.checked_sub(window).and_then(|from| samples.get(from..)))
+        else {
+            return Err(SavGolError::TooFew { got, window });
+        };
+        let middle = self.coefficients(window / 2);
+        let mut values = Vec::with_capacity(got);
+        values.extend((0..window / 2).map(|at| dot(&self.coefficients(at), first)));
+        values.extend(samples.windows(window).map(|seen| dot(&middle, seen)));
+        values.extend((window / 2 + 1..window).map(|at| dot(&self.coefficients(at), last)));
+        Ok(values)
+    }
+}
+
+/// The same for live use: the polynomial through the newest samples, at the
+/// last of them. It is noisier than in the middle, by
+/// [`SavGol::noise_gain`], and comes without delay for what is a polynomial.
+#[derive(Debug, Clone)]
+pub struct LiveSavGol {
+    coefficients: Vec<f64>,
+    ring: Vec<f64>,
+    next: usize,
+}
+
+impl LiveSavGol {
+    /// With an empty window.
+    pub fn new(filter: &SavGol) -> Self {
+        let coefficients = filter.coefficients(filter.window - 1);
+        Self { ring: Vec::with_capacity(coefficients.len()), coefficients, next: 0 }
+    }
+
+    /// Takes a sample; gives the value there, once the window is full.
+    pub fn step(&mut self, sample: f64) -> Option<f64> {
+        match self.ring.get_mut(self.next) {
+            Some(oldest) => *oldest = sample,
+            None => self.ring.push(sample),
+        }
+        self.next = (self.next + 1) % self.coefficients.len();
+        if self.ring.len() < self.coefficients.len() {
+            return None;
+        }
+        let (newer, older) = self.ring.split_at(self.next);
+        let seen = older.iter().chain(newer);
+        Some(self.coefficients.iter().zip(seen).map(|(c, value)| c * value).sum())
+    }
+}
+
+/// b'·q(k+1) = (x − a)·q(k) − b·q(k−1): what takes one polynomial of an
+/// orthonormal row to the next.
+#[derive(Debug, Clone, Copy)]
+struct Recurrence {
+    centre: f64,
+    back: f64,
+    norm: f64,
+}
+
+/// One polynomial of the row at every sample, and the one before it.
+struct Basis {
+    places: Vec<f64>,
+    values: Vec<f64>,
+    before: Vec<f64>,
+    norm: f64,
+}
+
+impl Basis {
+    fn new(places: Vec<f64>) -> Self {
+        let count = places.len();
+        let values = vec![1.0 / as_f64(count).sqrt(); count];
+        Self { places, values, before: vec![0.0; count], norm: 0.0 }
+    }
+
+    fn advance(&mut self) -> Recurrence {
+        let weighted = self.places.iter().zip(&self.values).map(|(x, q)| x * q * q);
+        let (centre, back) = (weighted.sum::<f64>(), self.norm);
+        let row = self.places.iter().zip(&self.values).zip(&self.before);
+        let mut next: Vec<f64> = row.map(|((x, q), p)| (x - centre) * q - back * p).collect();
+        let norm = dot(&next, &next).sqrt();
+        for value in &mut next {
+            *value /= norm;
+        }
+        self.before = std::mem::replace(&mut self.values, next);
+        self.norm = norm;
+        Recurrence { centre, back, norm }
+    }
+}
+
+/// Derivatives of the same polynomials at one place, from order 0 on.
+struct Derivatives {
+    place: f64,
+    values: [f64; MAX_DEGREE + 1],
+    before: [f64; MAX_DEGREE + 1],
+}
+
+impl Derivatives {
+    fn new(place: f64, level: f64) -> Self {
+        let mut values = [0.0; MAX_DEGREE + 1];
+        values[0] = level;
+        Self { place, values, before: [0.0; MAX_DEGREE + 1] }
+    }
+
+    fn of_order(&self, order: usize) -> f64 {
+        self.values.get(order).copied().unwrap_or(0.0)
+    }
+
+    /// The recurrence, differentiated by Leibniz's rule.
+    fn advance(&mut self, by: Recurrence) {
+        let mut next = [0.0; MAX_DEGREE + 1];
+        let mut lower = 0.0;
+        for (order, to) in next.iter_mut().enumerate() {
+            let (value, before) = (self.of_order(order), self.before.get(order).unwrap_or(&0.0));
+            *to = (self.place - by.centre) * value + as_f64(order) * lower - by.back * before;
+            *to /= by.norm;
+            lower = value;
+        }
+        self.before = std::mem::replace(&mut self.values, next);
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[expect(clippy::cast_precision_loss, reason = "samples of a window")]
+fn as_f64(count: usize) -> f64 {
+    count as f64
+}
+
+#[cfg(test)]
+mod tests;
