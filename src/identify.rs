@@ -3,8 +3,12 @@
 
 pub mod align;
 pub mod excitation;
+pub mod experiment;
 pub mod flow;
+pub mod grid;
 pub mod hampel;
 pub mod prbs;
 pub mod profile;
+pub mod quantity;
 pub mod savgol;
+pub mod table;

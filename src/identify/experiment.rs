@@ -1,0 +1,334 @@
+//! An input and an output on an even grid, once nothing speaks against finding
+//! a model in them.
+
+mod suspicion;
+
+use std::fmt;
+
+use self::suspicion::clipped_share;
+pub use self::suspicion::{Clipped, doubt_unit};
+use super::grid::{Gap, Grid, usual_step};
+
+/// Samples that a model takes at least.
+pub const FEWEST_SAMPLES: usize = 50;
+/// Usual steps between these can be of an extruder's log \[s\]; beyond them the
+/// unit of time is another.
+const STEPS_S: std::ops::RangeInclusive<f64> = 2e-5..=2.0;
+/// A column that moves by less than this share of its size is constant.
+const STILL: f64 = 1e-9;
+
+/// Which of the two columns is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// What the extruder was told, or what drives it.
+    Input,
+    /// What came of it.
+    Output,
+}
+
+impl fmt::Display for Side {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Input => "input",
+            Self::Output => "output",
+        })
+    }
+}
+
+/// Data that no model can be found in. Samples are counted from 0.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DataError {
+    /// Hardly anything there.
+    #[error("{got} samples: a model takes {FEWEST_SAMPLES} or more")]
+    TooFew {
+        /// Samples that there are.
+        got: usize,
+    },
+    /// Time that does not run on.
+    #[error(
+        "time {} at sample {}: {before_s} s, then {time_s} s; it must grow from line to line (write \
+         it with more digits, or keep one run alone)",
+        if .time_s == .before_s { "repeats" } else { "falls" }, .at + 1
+    )]
+    Order {
+        /// Sample.
+        at: usize,
+        /// The moment before it \[s\].
+        before_s: f64,
+        /// Its moment \[s\].
+        time_s: f64,
+    },
+    /// A unit of time that cannot be.
+    #[error(
+        "from sample to sample {step_s} s, if the unit of time is right: no log of an extruder has \
+         such steps. {}", if *.step_s > 1.0 {
+            "Is the column in ms? Say so with --unit COLUMN=ms; if it is right, with --unit COLUMN=s"
+        } else {
+            "Is the column in s? Say so with --unit COLUMN=s"
+        }
+    )]
+    TimeUnit {
+        /// The usual step \[s\].
+        step_s: f64,
+    },
+    /// Nothing logged for long.
+    #[error(
+        "a gap of {:.3} s after {:.3} s (sample {}){}; gaps up to {limit_s:.3} s are bridged: use a \
+         part without it, or allow longer ones with --max-gap-s", .gap.length_s, .gap.from_s,
+        .gap.after + 1, if *.count > 1 { format!(", the longest of {count}") } else { String::new() }
+    )]
+    Gap {
+        /// The longest one.
+        gap: Gap,
+        /// Gaps that are too long.
+        count: usize,
+        /// The longest that is bridged \[s\].
+        limit_s: f64,
+    },
+    /// A column that does not move.
+    #[error(
+        "the {side} is {value} all the time: nothing can be told from it{}",
+        if *.side == Side::Input { "; excite it (truebead excite writes profiles)" } else {
+            "; see that its sensor is connected"
+        }
+    )]
+    Constant {
+        /// Which one.
+        side: Side,
+        /// Its value.
+        value: f64,
+    },
+    /// A sensor at the end of its range.
+    #[error(
+        "the {side} is clipped: {:.1} % of its samples are exactly {} ({} separate times); measure \
+         with a wider range, or say --accept-clipped if it is a command with limits",
+        100.0 * .clipped.share, .clipped.value, .clipped.visits
+    )]
+    Clipped {
+        /// Which one.
+        side: Side,
+        /// How and where.
+        clipped: Clipped,
+    },
+    /// A part that tells nothing.
+    #[error("{got} samples are left to validate with: {FEWEST_SAMPLES} or more are needed")]
+    ShortValidation {
+        /// Samples that there are.
+        got: usize,
+    },
+}
+
+/// What was done to the data, or is odd about them, in words.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Note {
+    /// Gaps that were bridged.
+    Bridged {
+        /// How many.
+        count: usize,
+        /// The longest one.
+        longest: Gap,
+        /// The longest that would be \[s\].
+        limit_s: f64,
+    },
+    /// Uneven sampling.
+    Resampled {
+        /// Step of the grid \[s\].
+        step_s: f64,
+    },
+    /// A limit that was accepted.
+    Clipped {
+        /// Which one.
+        side: Side,
+        /// How and where.
+        clipped: Clipped,
+    },
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Bridged { count, longest, limit_s } => write!(
+                f,
+                "{count} gap{} bridged by straight lines, the longest of {:.3} s after {:.3} s (up \
+                 to {limit_s:.3} s are)",
+                if *count == 1 { "" } else { "s" },
+                longest.length_s,
+                longest.from_s
+            ),
+            Self::Resampled { step_s } => write!(
+                f,
+                "sampled unevenly; taken to a grid of {:.6} s ({:.2} Hz)",
+                step_s,
+                1.0 / step_s
+            ),
+            Self::Clipped { side, clipped } => write!(
+                f,
+                "the {side} is exactly {} in {:.1} % of the samples: a limit acts there",
+                clipped.value,
+                100.0 * clipped.share
+            ),
+        }
+    }
+}
+
+/// What may be done to data.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Rules {
+    /// Gaps up to this are bridged \[s\]; none for five steps.
+    pub max_gap_s: Option<f64>,
+    /// Whether a column may be clipped.
+    pub accept_clipped: bool,
+    /// Whether the unit of time was told, and is not doubted.
+    pub time_is_told: bool,
+}
+
+/// An input and an output on one even grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Experiment {
+    /// Moment of the first sample \[s\].
+    pub start_s: f64,
+    /// From sample to sample \[s\].
+    pub step_s: f64,
+    /// What goes in, in its own unit.
+    pub input: Vec<f64>,
+    /// What comes out, in its own unit.
+    pub output: Vec<f64>,
+    /// Whether the input holds each value until the next, as a command does,
+    /// and does not run straight to it.
+    pub input_is_held: bool,
+    /// What was done to the data.
+    pub notes: Vec<Note>,
+}
+
+impl Experiment {
+    /// From columns of one length.
+    pub fn new(
+        time_s: &[f64],
+        input: &[f64],
+        output: &[f64],
+        rules: &Rules,
+    ) -> Result<Self, DataError> {
+        let got = time_s.len().min(input.len()).min(output.len());
+        if got < FEWEST_SAMPLES {
+            return Err(DataError::TooFew { got });
+        }
+        check_time(time_s, rules)?;
+        let grid = Grid::of(time_s).ok_or(DataError::TooFew { got })?;
+        let mut notes = bridge(&grid, rules)?;
+        for (side, values) in [(Side::Input, input), (Side::Output, output)] {
+            check_moves(side, values)?;
+            if let Some(clipped) = clipped_share(values) {
+                if !rules.accept_clipped {
+                    return Err(DataError::Clipped { side, clipped });
+                }
+                notes.push(Note::Clipped { side, clipped });
+            }
+        }
+        let input_is_held = is_held(input);
+        let (input, output) = if grid.is_uneven {
+            let input =
+                if input_is_held { grid.held(time_s, input) } else { grid.linear(time_s, input) };
+            (input, grid.linear(time_s, output))
+        } else {
+            (input.to_vec(), output.to_vec())
+        };
+        let Grid { start_s, step_s, .. } = grid;
+        Ok(Self { start_s, step_s, input, output, input_is_held, notes })
+    }
+
+    /// Samples.
+    pub fn len(&self) -> usize {
+        self.input.len().min(self.output.len())
+    }
+
+    /// Whether there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// How long it lasts \[s\].
+    #[expect(clippy::cast_precision_loss, reason = "counts of samples")]
+    pub fn duration_s(&self) -> f64 {
+        self.len().saturating_sub(1) as f64 * self.step_s
+    }
+
+    /// The beginning to fit to, and this share of it at the end to validate
+    /// with. The notes stay with the first. Fails where either is too short, or
+    /// the input or the output of either does not move.
+    pub fn split(mut self, share: f64) -> Result<(Self, Self), DataError> {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            clippy::cast_precision_loss,
+            reason = "a share of a count"
+        )]
+        let kept = (self.len() as f64 * (1.0 - share.clamp(0.0, 1.0))).round() as usize;
+        let left = self.len().saturating_sub(kept);
+        if left < FEWEST_SAMPLES {
+            return Err(DataError::ShortValidation { got: left });
+        }
+        if kept < FEWEST_SAMPLES {
+            return Err(DataError::TooFew { got: kept });
+        }
+        let (input, output) = (self.input.split_off(kept), self.output.split_off(kept));
+        for (side, values) in [
+            (Side::Input, &self.input),
+            (Side::Output, &self.output),
+            (Side::Input, &input),
+            (Side::Output, &output),
+        ] {
+            check_moves(side, values)?;
+        }
+        #[expect(clippy::cast_precision_loss, reason = "counts of samples")]
+        let start_s = self.start_s + kept as f64 * self.step_s;
+        let rest = Self { start_s, input, output, notes: Vec::new(), ..self };
+        Ok((self, rest))
+    }
+}
+
+fn check_time(time_s: &[f64], rules: &Rules) -> Result<(), DataError> {
+    let falls = time_s.windows(2).position(|pair| pair[1] <= pair[0]);
+    if let Some((at, pair)) = falls.and_then(|k| Some((k + 1, time_s.get(k..k + 2)?))) {
+        return Err(DataError::Order { at, before_s: pair[0], time_s: pair[1] });
+    }
+    let step_s = usual_step(time_s).unwrap_or(0.0);
+    if !rules.time_is_told && !STEPS_S.contains(&step_s) {
+        return Err(DataError::TimeUnit { step_s });
+    }
+    Ok(())
+}
+
+fn bridge(grid: &Grid, rules: &Rules) -> Result<Vec<Note>, DataError> {
+    let limit_s = rules.max_gap_s.unwrap_or(grid.usual_limit_s());
+    let mut notes = Vec::new();
+    if let Some(longest) = grid.longest().copied() {
+        // A limit of so many steps includes a gap of as many.
+        let is_long = |gap: &&Gap| gap.length_s > limit_s * (1.0 + 1e-6);
+        let count = grid.gaps.iter().filter(is_long).count();
+        if count > 0 {
+            return Err(DataError::Gap { gap: longest, count, limit_s });
+        }
+        notes.push(Note::Bridged { count: grid.gaps.len(), longest, limit_s });
+    } else if grid.is_uneven {
+        notes.push(Note::Resampled { step_s: grid.step_s });
+    }
+    Ok(notes)
+}
+
+fn check_moves(side: Side, values: &[f64]) -> Result<(), DataError> {
+    let start = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = values.iter().fold(start, |(low, high), v| (low.min(*v), high.max(*v)));
+    if high - low > STILL * high.abs().max(low.abs()) {
+        return Ok(());
+    }
+    Err(DataError::Constant { side, value: low })
+}
+
+/// Whether most samples repeat the one before them.
+fn is_held(values: &[f64]) -> bool {
+    let repeated = values.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    repeated * 2 > values.len()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,206 @@
+//! Logged data as a table with named columns. Lines are counted as an editor
+//! counts them, the names being line 1.
+
+/// What is wrong with a table.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum TableError {
+    /// Nothing in it.
+    #[error("there is no line with the names of columns")]
+    Empty,
+    /// A line that is not one of a table.
+    #[error("line {line}: {what}")]
+    Line {
+        /// Which one.
+        line: u64,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A name that is there twice.
+    #[error("two columns are called {name}")]
+    Twice {
+        /// The name.
+        name: String,
+    },
+    /// No column of this name.
+    #[error("there is no column {name}; the columns are {}", .known.join(", "))]
+    NoColumn {
+        /// What was asked for.
+        name: String,
+        /// Those that are there.
+        known: Vec<String>,
+    },
+    /// A cell that is no finite number.
+    #[error(
+        "line {line}, column {column}: found {}, expected a number{}", shown(.found), and_more(*.others)
+    )]
+    Cell {
+        /// Its line.
+        line: u64,
+        /// Its column.
+        column: String,
+        /// What stands there.
+        found: String,
+        /// How many more cells of the column are none.
+        others: usize,
+    },
+}
+
+fn shown(found: &str) -> String {
+    if found.is_empty() { "nothing".to_owned() } else { format!("\"{found}\"") }
+}
+
+fn and_more(count: usize) -> String {
+    match count {
+        0 => String::new(),
+        1 => " (and one more such cell)".to_owned(),
+        many => format!(" (and {many} more such cells)"),
+    }
+}
+
+/// A table as it stands in a file.
+#[derive(Debug, Clone)]
+pub struct Table {
+    names: Vec<String>,
+    rows: Vec<csv::StringRecord>,
+    lines: Vec<u64>,
+}
+
+/// Shortest way to write a byte order mark.
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
+impl Table {
+    /// Reads a file's text: separated by commas, or by semicolons or tabs where
+    /// the first line has those instead. Empty lines and lines that begin with
+    /// `#` are left out.
+    pub fn parse(text: &str) -> Result<Self, TableError> {
+        let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text);
+        let names = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#'));
+        let names = names.ok_or(TableError::Empty)?;
+        let separators = [b',', b';', b'\t'];
+        let separator = separators.into_iter().find(|byte| names.as_bytes().contains(byte));
+        let mut reader = csv::ReaderBuilder::new()
+            .delimiter(separator.unwrap_or(b','))
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        let names = reader.headers().map_err(|error| of_line(&error))?;
+        let names: Vec<String> = names.iter().map(str::to_owned).collect();
+        let twice =
+            names.iter().enumerate().find(|(at, name)| names.iter().take(*at).any(|n| n == *name));
+        if let Some((_, name)) = twice {
+            return Err(TableError::Twice { name: name.clone() });
+        }
+        let (mut rows, mut lines) = (Vec::new(), Vec::new());
+        for row in reader.records() {
+            let row = row.map_err(|error| of_line(&error))?;
+            lines.push(row.position().map_or(0, |place| line_of(text, place)));
+            rows.push(row);
+        }
+        Ok(Self { names, rows, lines })
+    }
+
+    /// Names of the columns.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Rows without the names.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// The line of a row in the file.
+    pub fn line(&self, row: usize) -> u64 {
+        self.lines.get(row).copied().unwrap_or(0)
+    }
+
+    /// The numbers of a column; fails on the first cell that is none.
+    pub fn column(&self, name: &str) -> Result<Vec<f64>, TableError> {
+        let at = self.names.iter().position(|known| known == name).ok_or_else(|| {
+            TableError::NoColumn { name: name.to_owned(), known: self.names.clone() }
+        })?;
+        let cells = || self.rows.iter().map(|row| row.get(at).unwrap_or_default());
+        let numbers: Option<Vec<f64>> = cells().map(number).collect();
+        numbers.ok_or_else(|| {
+            let mut wrong = cells().zip(&self.lines).filter(|(cell, _)| number(cell).is_none());
+            let (found, line) = wrong.next().map_or(("", 0), |(cell, line)| (cell, *line));
+            TableError::Cell {
+                line,
+                column: name.to_owned(),
+                found: found.to_owned(),
+                others: wrong.count(),
+            }
+        })
+    }
+}
+
+/// The reader's places of rows are before the empty lines and the remarks that
+/// it leaves out.
+fn line_of(text: &str, place: &csv::Position) -> u64 {
+    let at = usize::try_from(place.byte()).unwrap_or(usize::MAX);
+    let rest = text.get(at..).unwrap_or_default().lines();
+    let left_out = rest.take_while(|line| line.trim().is_empty() || line.starts_with('#')).count();
+    place.line() + left_out as u64
+}
+
+fn number(cell: &str) -> Option<f64> {
+    cell.parse::<f64>().ok().filter(|number| number.is_finite())
+}
+
+fn of_line(error: &csv::Error) -> TableError {
+    let line = error.position().map_or(1, csv::Position::line);
+    let what = match error.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("{len} cells, expected {expected_len} as in the line of names")
+        }
+        csv::ErrorKind::Utf8 { .. } => "this is no text".to_owned(),
+        _ => error.to_string(),
+    };
+    TableError::Line { line, what }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+
+    #[test]
+    fn columns_are_found_by_name_whatever_separates_them() {
+        for separator in [",", ";", "\t"] {
+            let text = "# a log\ntime_s,screw_rpm,remark\n\n0,20.5,start\n0.1,-3e1,\n";
+            let table = Table::parse(&text.replace(',', separator)).unwrap();
+            assert_eq!(table.column("screw_rpm").unwrap(), [20.5, -30.0]);
+            assert_eq!((table.len(), table.line(0), table.line(1)), (2, 4, 5));
+        }
+    }
+
+    #[test]
+    fn a_cell_that_is_no_number_is_named() {
+        let table = Table::parse("time_s,rpm\n0,1\n0.1,NaN\n0.2,off\n0.3,\n0.4,inf\n").unwrap();
+        let error = table.column("rpm").unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "line 3, column rpm: found \"NaN\", expected a number (and 3 more such cells)"
+        );
+        let table = Table::parse("time_s,rpm\n0,\n").unwrap();
+        let error = table.column("rpm").unwrap_err().to_string();
+        assert_eq!(error, "line 2, column rpm: found nothing, expected a number");
+    }
+
+    #[test]
+    fn what_is_no_table_is_told() {
+        let said = |text: &str| Table::parse(text).unwrap_err().to_string();
+        assert_eq!(said("\n\n"), "there is no line with the names of columns");
+        assert_eq!(said("a,a\n1,2\n"), "two columns are called a");
+        assert_eq!(said("a,b\n1,2\n3\n"), "line 3: 1 cells, expected 2 as in the line of names");
+        let table = Table::parse("a,b\n1,2\n").unwrap();
+        let error = table.column("c").unwrap_err().to_string();
+        assert_eq!(error, "there is no column c; the columns are a, b");
+    }
+}
