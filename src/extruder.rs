@@ -8,6 +8,7 @@
 //! ticks (200 Hz) ──────┘
 //! ```
 
+pub mod adaptive;
 pub mod demand;
 pub mod law;
 pub mod limits;

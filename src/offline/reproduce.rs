@@ -9,10 +9,12 @@ use super::Progress;
 use super::report::series::Series;
 use super::report::whole_page;
 use crate::config::Problems;
+use crate::extruder::adaptive::SubSystemError;
 use crate::sim::cell::SimError;
 use crate::sim::render::RenderError;
 
 pub mod barjuei2022;
+pub mod looey2026;
 pub mod table;
 
 /// One quantity of one experiment.
@@ -41,6 +43,8 @@ pub struct Row {
 pub enum Source {
     /// Shojaei Barjuei et al. 2022: width by robot speed.
     Barjuei2022,
+    /// Mohammadi Looey et al. 2026: adaptive law of nozzle and plate.
+    Looey2026,
 }
 
 /// How much is spent on an experiment with noise; none is the source's own
@@ -68,6 +72,9 @@ pub enum ReproduceError {
     /// A picture cannot be rendered.
     #[error(transparent)]
     Render(#[from] RenderError),
+    /// An adaptive law cannot be set up.
+    #[error(transparent)]
+    Adaptive(#[from] SubSystemError),
 }
 
 /// What a source came to.
@@ -96,12 +103,13 @@ pub struct Section {
 
 impl Source {
     /// All of them, in the order of the page.
-    pub const ALL: [Self; 1] = [Self::Barjuei2022];
+    pub const ALL: [Self; 2] = [Self::Barjuei2022, Self::Looey2026];
 
     /// The name that `reproduce.json` and the command line have.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Barjuei2022 => "barjuei2022",
+            Self::Looey2026 => "looey2026",
         }
     }
 
@@ -109,6 +117,7 @@ impl Source {
     pub const fn about(self) -> &'static str {
         match self {
             Self::Barjuei2022 => "Shojaei Barjuei et al. 2022: width by robot speed",
+            Self::Looey2026 => "Mohammadi Looey et al. 2026: adaptive law of nozzle and plate",
         }
     }
 
@@ -116,6 +125,7 @@ impl Source {
     pub const fn experiments(self) -> u64 {
         match self {
             Self::Barjuei2022 => barjuei2022::EXPERIMENTS,
+            Self::Looey2026 => looey2026::EXPERIMENTS,
         }
     }
 
@@ -127,6 +137,7 @@ impl Source {
     ) -> Result<Reproduced, ReproduceError> {
         match self {
             Self::Barjuei2022 => barjuei2022::run(effort, progress),
+            Self::Looey2026 => looey2026::run(effort, progress),
         }
     }
 }

@@ -1,0 +1,165 @@
+//! Model-reference adaptive control of an extruder that lays a strand on a
+//! moving plate (Mohammadi Looey et al. 2026): the feed ṁ holds the speed in
+//! the nozzle, the plate's speed `U_s` the speed of the strand, and what the
+//! model does not know is learnt as an offset of each input.
+//!
+//! The paper's eqs. (8), (12), (13) and (18)–(25) mix up indices; with the
+//! plant (6), (7) the laws are
+//!
+//! ```text
+//! ṁ  = −k1·v̄1 + r1 − (β1/β3)·p_d1    − Δ̂1,   Δ̂1' = γ1·p1·β3·e1
+//! Us = −k3·ū3 + r3 − (β4·β5/β7)·v̄1  − Δ̂3,   Δ̂3' = γ3·p3·β7·e3
+//! ```
+//!
+//! and the error of either obeys ë + a·ė + γ·p·β²·e = β·Δ', so that a ramp of
+//! the uncertainty is followed with a constant error. [`Adaptation::Ramp`]
+//! learns the slope as well and leaves none.
+
+mod estimate;
+mod gains;
+mod law;
+#[cfg(test)]
+mod tests;
+
+pub use gains::{Adaptation, FirstOrder, GainError, Gains, Safety};
+pub use law::{Action, Law, RampErrors};
+
+use crate::time::Span;
+
+/// The plant of eqs. (6), (7) with constant parameters: v̄1 \[m/s\] in the
+/// nozzle, ū3 \[m/s\] of the strand, ṁ \[kg/s\], `U_s` \[m/s\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StrandModel {
+    /// β1: speed in the nozzle for each unit of the pressure gradient and
+    /// second.
+    pub pressure_gain: f64,
+    /// β2 and β3.
+    pub nozzle: FirstOrder,
+    /// β4: speed behind the nozzle over that in it (bending and swelling).
+    pub swell: f64,
+    /// β5: how the strand is driven by what comes from the nozzle \[1/s\].
+    pub push_per_s: f64,
+    /// β6 and β7.
+    pub strand: FirstOrder,
+}
+
+/// What is measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// v̄1 \[m/s\].
+    pub nozzle_m_per_s: f64,
+    /// ū3 \[m/s\].
+    pub strand_m_per_s: f64,
+    /// `p_d1` in the unit of [`StrandModel::pressure_gain`].
+    pub pressure_gradient: f64,
+}
+
+/// What is wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Targets {
+    /// v̄1 \[m/s\].
+    pub nozzle_m_per_s: f64,
+    /// ū3 \[m/s\].
+    pub strand_m_per_s: f64,
+}
+
+/// What is commanded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inputs {
+    /// ṁ \[kg/s\].
+    pub mass_flow_kg_per_s: f64,
+    /// `U_s` \[m/s\].
+    pub plate_m_per_s: f64,
+}
+
+/// Which sub-system's law cannot be set up, and why.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("adaptive law of the {part}: {why}")]
+pub struct SubSystemError {
+    /// `nozzle` or `strand`.
+    pub part: &'static str,
+    /// What is wrong.
+    #[source]
+    pub why: GainError,
+}
+
+/// Both laws with what couples them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Adaptive {
+    model: StrandModel,
+    nozzle: Law,
+    strand: Law,
+}
+
+impl Adaptive {
+    /// Both laws, with commands that are held for `hold`.
+    pub fn new(
+        model: StrandModel,
+        nozzle: Gains,
+        strand: Gains,
+        hold: Span,
+    ) -> Result<Self, SubSystemError> {
+        let of = |part, plant, gains| {
+            Law::new(plant, gains, hold).map_err(|why| SubSystemError { part, why })
+        };
+        let coupling = [model.pressure_gain, model.swell, model.push_per_s];
+        if let Some(value) = coupling.into_iter().find(|value| !value.is_finite()) {
+            let why = GainError::NotFinite { what: "a coupling of the sub-systems", value };
+            return Err(SubSystemError { part: "strand", why });
+        }
+        let nozzle = of("nozzle", model.nozzle, nozzle)?;
+        let strand = of("strand", model.strand, strand)?;
+        Ok(Self { model, nozzle, strand })
+    }
+
+    /// Starts bumpless from what is measured and applied in a steady state.
+    pub fn start(&mut self, reading: &Reading, applied: Inputs) {
+        let (pressure, push) = self.known(reading.pressure_gradient, reading.nozzle_m_per_s);
+        self.nozzle.start(reading.nozzle_m_per_s, applied.mass_flow_kg_per_s, pressure);
+        self.strand.start(reading.strand_m_per_s, applied.plate_m_per_s, push);
+    }
+
+    /// Sets both estimates: of the feed \[kg/s\] and of the plate \[m/s\].
+    pub fn know(&mut self, feed_kg_per_s: f64, plate_m_per_s: f64) {
+        self.nozzle.know(feed_kg_per_s);
+        self.strand.know(plate_m_per_s);
+    }
+
+    /// One step of both, `dt` after the last one. Returns the actions of the
+    /// nozzle (kg/s) and of the strand (m/s).
+    pub fn step(&mut self, reading: &Reading, targets: &Targets, dt: Span) -> (Action, Action) {
+        let (pressure, _) = self.known(reading.pressure_gradient, 0.0);
+        let reference = self.nozzle.reference_for(targets.nozzle_m_per_s);
+        let nozzle = self.nozzle.step(reading.nozzle_m_per_s, reference, pressure, dt);
+        // The nozzle moves while the plate's command is held: its mean counts.
+        let mean = f64::midpoint(nozzle.model + nozzle.error, nozzle.foretold);
+        let (_, push) = self.known(0.0, mean);
+        let reference = self.strand.reference_for(targets.strand_m_per_s);
+        let strand = self.strand.step(reading.strand_m_per_s, reference, push, dt);
+        (nozzle, strand)
+    }
+
+    /// Tells what was applied in place of the commands.
+    pub fn settle(&mut self, applied: Inputs) {
+        self.nozzle.settle(applied.mass_flow_kg_per_s);
+        self.strand.settle(applied.plate_m_per_s);
+    }
+
+    /// The law of the nozzle.
+    pub fn nozzle(&self) -> &Law {
+        &self.nozzle
+    }
+
+    /// The law of the strand.
+    pub fn strand(&self) -> &Law {
+        &self.strand
+    }
+
+    /// What pressure and nozzle do, as inputs: (β1/β3)·p and (β4·β5/β7)·v̄1.
+    fn known(&self, pressure_gradient: f64, nozzle_m_per_s: f64) -> (f64, f64) {
+        let model = &self.model;
+        let pressure = model.pressure_gain / model.nozzle.input_gain * pressure_gradient;
+        let push = model.swell * model.push_per_s / model.strand.input_gain * nozzle_m_per_s;
+        (pressure, push)
+    }
+}

@@ -1,0 +1,276 @@
+//! What an adaptive law is set up with, and the conditions that it must keep.
+
+use crate::time::Span;
+
+/// A first-order plant with a matched uncertainty: ẏ = a·y + b·(u + w + Δ),
+/// with the output y, the input u, the known part w and the unknown part Δ,
+/// both in the unit of the input.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FirstOrder {
+    /// a: β2 of the nozzle, β6 of the strand \[1/s\].
+    pub state_gain_per_s: f64,
+    /// b: β3 of the nozzle, β7 of the strand \[unit of y per second and unit
+    /// of u\].
+    pub input_gain: f64,
+}
+
+/// Gains of the law u = −k·y + r − w − Δ̂ (Mohammadi Looey et al. 2026, eq. (8)
+/// with its indices mended).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gains {
+    /// k: feedback of the output \[unit of u per unit of y\].
+    pub feedback: f64,
+    /// What is fed back beyond k from the error against the reference model
+    /// \[unit of u per unit of y\]. It makes the error faster without changing
+    /// the answer to the reference; 0 is the paper's law.
+    pub error_feedback: f64,
+    /// How the unknown part is learnt.
+    pub adaptation: Adaptation,
+    /// What the estimate may be.
+    pub safety: Safety,
+}
+
+impl Gains {
+    /// Gains that learn the slope as well, with all three poles of the error
+    /// at the same place \[1/s\]: a triple pole swings least for its speed.
+    /// The reference is answered as with the feedback alone. Fast poles are
+    /// paid for with noise: the command carries that of the measured output
+    /// times feedback and error feedback.
+    pub fn triple_pole(plant: FirstOrder, feedback: f64, pole_per_s: f64) -> Self {
+        let together = (3.0 * pole_per_s + plant.state_gain_per_s) / plant.input_gain;
+        let square = plant.input_gain * plant.input_gain;
+        Self {
+            feedback,
+            error_feedback: together - feedback,
+            adaptation: Adaptation::Ramp {
+                learning_rate: 3.0 * pole_per_s * pole_per_s / square,
+                weight: 1.0,
+                slope_rate_per_s: pole_per_s / 3.0,
+            },
+            safety: Safety::default(),
+        }
+    }
+}
+
+/// How the estimate Δ̂ of the unknown part moves with the error e against the
+/// reference model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Adaptation {
+    /// Not at all: the law of the paper with γ = 0, which keeps what it is
+    /// started with.
+    Off,
+    /// Δ̂' = γ·p·b·e, eq. (9). The error vanishes where Δ is constant; a ramp
+    /// Δ' = c leaves c/(γ·p·b).
+    Constant {
+        /// γ: learning rate.
+        learning_rate: f64,
+        /// p: weight of the error in the Lyapunov function (16).
+        weight: f64,
+    },
+    /// Δ̂' = γ·p·b·e + c·̂ with c·̂' = λ·γ·p·b·e: the slope of Δ is learnt too,
+    /// and a ramp leaves no error.
+    Ramp {
+        /// γ: learning rate.
+        learning_rate: f64,
+        /// p: weight of the error in the Lyapunov function.
+        weight: f64,
+        /// λ: how fast the slope is learnt; below the error's own pole \[1/s\].
+        slope_rate_per_s: f64,
+    },
+}
+
+/// What keeps the estimate from going where no uncertainty can be.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Safety {
+    /// The largest size of Δ̂ (projection); the slope is not learnt further
+    /// there \[unit of u\].
+    pub bound: Option<f64>,
+    /// σ: the estimate is forgotten at this rate, which bounds it where noise
+    /// would let it drift. In exchange a constant Δ leaves an error
+    /// b·σ·Δ/(α·σ + γ·p·b²), with the error's pole −α; 0 is the paper's law
+    /// \[1/s\].
+    pub leakage_per_s: f64,
+}
+
+/// A law that cannot be set up.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum GainError {
+    /// Not a number.
+    #[error("{what} is {value}: give a finite number")]
+    NotFinite {
+        /// Which gain.
+        what: &'static str,
+        /// What was found.
+        value: f64,
+    },
+    /// The input does nothing.
+    #[error("the input gain is 0: the input does not move the output, so nothing can be learnt")]
+    NoInput,
+    /// The reference model runs away.
+    #[error(
+        "the reference model's pole {pole:.4} 1/s is not stable: the feedback k must make \
+         a − b·k negative, with a = {state_gain:.4} and b = {input_gain:.4}"
+    )]
+    Reference {
+        /// a − b·k.
+        pole: f64,
+        /// a.
+        state_gain: f64,
+        /// b.
+        input_gain: f64,
+    },
+    /// The error runs away.
+    #[error(
+        "the error's pole {pole:.4} 1/s is not stable: feedback and error feedback together must \
+         make a − b·(k + error feedback) negative"
+    )]
+    Error {
+        /// a − b·(k + κ).
+        pole: f64,
+    },
+    /// A gain that must be above zero is not.
+    #[error("{what} is {value}: it must be above 0 (to learn nothing, switch the adaptation off)")]
+    NotPositive {
+        /// Which gain.
+        what: &'static str,
+        /// What was found.
+        value: f64,
+    },
+    /// The slope is learnt too fast.
+    #[error("the slope's rate {rate} 1/s is not stable: it must be below {limit:.4} 1/s")]
+    SlopeRate {
+        /// What was found.
+        rate: f64,
+        /// Where the error begins to grow.
+        limit: f64,
+    },
+    /// Stable in continuous time, but not at the rate of the commands.
+    #[error(
+        "at a command every {hold_s} s the error grows by {radius:.3} from one to the next: \
+         command more often, or take smaller gains"
+    )]
+    TooSeldom {
+        /// Time that a command is held \[s\].
+        hold_s: f64,
+        /// Largest eigenvalue of the sampled error.
+        radius: f64,
+    },
+}
+
+impl Adaptation {
+    /// γ·p·b, the gain from the error to the estimate's speed; 0 when nothing
+    /// is learnt.
+    pub(super) fn rate(&self, input_gain: f64) -> f64 {
+        match self {
+            Self::Off => 0.0,
+            Self::Constant { learning_rate, weight } | Self::Ramp { learning_rate, weight, .. } => {
+                learning_rate * weight * input_gain
+            }
+        }
+    }
+
+    /// λ \[1/s\]; 0 when the slope is not learnt.
+    pub(super) fn slope_rate_per_s(&self) -> f64 {
+        match self {
+            Self::Off | Self::Constant { .. } => 0.0,
+            Self::Ramp { slope_rate_per_s, .. } => *slope_rate_per_s,
+        }
+    }
+}
+
+impl FirstOrder {
+    /// What the output becomes of itself, and of an input that is held, in a
+    /// time \[s\]: e^(a·t) and b·∫e^(a·s)ds.
+    pub fn held(&self, t_s: f64) -> (f64, f64) {
+        let x = self.state_gain_per_s * t_s;
+        (libm::exp(x), self.input_gain * t_s * mean_exp(x))
+    }
+
+    /// The pole under a feedback \[1/s\].
+    pub fn pole(&self, feedback: f64) -> f64 {
+        self.state_gain_per_s - self.input_gain * feedback
+    }
+}
+
+/// (e^x − 1)/x, which is 1 at 0.
+pub(super) fn mean_exp(x: f64) -> f64 {
+    if x == 0.0 { 1.0 } else { libm::expm1(x) / x }
+}
+
+/// Checks a law in continuous time: eq. (11), γ and p above zero, and the
+/// Routh–Hurwitz condition of the error where the slope is learnt as well.
+pub(super) fn check(plant: FirstOrder, gains: &Gains, hold: Span) -> Result<(), GainError> {
+    all_finite(plant, gains)?;
+    positive("the time that a command is held", hold.secs())?;
+    if plant.input_gain == 0.0 {
+        return Err(GainError::NoInput);
+    }
+    let pole = plant.pole(gains.feedback);
+    if pole >= 0.0 {
+        let (state_gain, input_gain) = (plant.state_gain_per_s, plant.input_gain);
+        return Err(GainError::Reference { pole, state_gain, input_gain });
+    }
+    let pole = plant.pole(gains.feedback + gains.error_feedback);
+    if pole >= 0.0 {
+        return Err(GainError::Error { pole });
+    }
+    if let Some(bound) = gains.safety.bound {
+        positive("the bound of the estimate", bound)?;
+    }
+    let leak = gains.safety.leakage_per_s;
+    if leak < 0.0 {
+        return Err(GainError::NotPositive { what: "the leakage", value: leak });
+    }
+    match gains.adaptation {
+        Adaptation::Off => Ok(()),
+        Adaptation::Constant { learning_rate, weight } => learning(learning_rate, weight),
+        Adaptation::Ramp { learning_rate, weight, slope_rate_per_s: rate } => {
+            learning(learning_rate, weight)?;
+            positive("the slope's rate", rate)?;
+            let square = gains.adaptation.rate(plant.input_gain) * plant.input_gain;
+            let limit = slope_rate_limit(-pole, square, leak);
+            if rate < limit { Ok(()) } else { Err(GainError::SlopeRate { rate, limit }) }
+        }
+    }
+}
+
+/// Below which λ all roots of (s + a)(s + σ)² + ω²(s + σ) + λω² lie to the
+/// left (Hurwitz 1895); a without leakage.
+fn slope_rate_limit(a: f64, square: f64, leak: f64) -> f64 {
+    let (c2, c1) = (a + 2.0 * leak, leak * leak + 2.0 * a * leak + square);
+    (c2 * c1 - a * leak * leak - leak * square) / square
+}
+
+fn learning(learning_rate: f64, weight: f64) -> Result<(), GainError> {
+    positive("the learning rate", learning_rate)?;
+    positive("the weight of the error", weight)
+}
+
+fn positive(what: &'static str, value: f64) -> Result<(), GainError> {
+    if value > 0.0 { Ok(()) } else { Err(GainError::NotPositive { what, value }) }
+}
+
+fn all_finite(plant: FirstOrder, gains: &Gains) -> Result<(), GainError> {
+    let (learning_rate, weight, slope) = match gains.adaptation {
+        Adaptation::Off => (0.0, 0.0, 0.0),
+        Adaptation::Constant { learning_rate, weight } => (learning_rate, weight, 0.0),
+        Adaptation::Ramp { learning_rate, weight, slope_rate_per_s } => {
+            (learning_rate, weight, slope_rate_per_s)
+        }
+    };
+    let found = [
+        ("the state gain", plant.state_gain_per_s),
+        ("the input gain", plant.input_gain),
+        ("the feedback", gains.feedback),
+        ("the error feedback", gains.error_feedback),
+        ("the learning rate", learning_rate),
+        ("the weight of the error", weight),
+        ("the slope's rate", slope),
+        ("the leakage", gains.safety.leakage_per_s),
+        ("the bound of the estimate", gains.safety.bound.unwrap_or(0.0)),
+    ];
+    match found.into_iter().find(|(_, value)| !value.is_finite()) {
+        Some((what, value)) => Err(GainError::NotFinite { what, value }),
+        None => Ok(()),
+    }
+}

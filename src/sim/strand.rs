@@ -1,0 +1,130 @@
+//! The plant of Mohammadi Looey et al. 2026: speed in the nozzle and speed of
+//! the strand on the moving plate.
+
+use crate::extruder::adaptive::{Inputs, StrandModel};
+
+/// An unknown part of an input over time, in the unit of that input; time in
+/// seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Disturbance {
+    /// Nothing.
+    #[default]
+    None,
+    /// A step of a size at a time, and back at another (infinite: never).
+    Step {
+        /// How large.
+        size: f64,
+        /// When \[s\].
+        from_s: f64,
+        /// Until when \[s\].
+        to_s: f64,
+    },
+    /// A ramp from a time on.
+    Ramp {
+        /// How much a second.
+        slope_per_s: f64,
+        /// When \[s\].
+        from_s: f64,
+        /// Where it ends and stays \[s\].
+        to_s: f64,
+    },
+}
+
+impl Disturbance {
+    /// Its value at a time, as it is from that time on.
+    pub fn at(&self, t_s: f64) -> f64 {
+        match *self {
+            Self::None => 0.0,
+            Self::Step { size, from_s, to_s } => {
+                if (from_s..to_s).contains(&t_s) {
+                    size
+                } else {
+                    0.0
+                }
+            }
+            Self::Ramp { slope_per_s, from_s, to_s } => {
+                slope_per_s * (t_s.min(to_s) - from_s).max(0.0)
+            }
+        }
+    }
+}
+
+/// How the plant's parameters go with its inputs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Parameters {
+    /// Constant, eqs. (6) and (7): the plant that the law is designed for.
+    Constant,
+    /// In proportion to the inputs, eqs. (1)–(5), and equal to the constants
+    /// at these.
+    WithInputs(Inputs),
+}
+
+/// The plant's state and parameters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Strand {
+    model: StrandModel,
+    parameters: Parameters,
+    /// `p_d1`, which is constant here.
+    pub pressure_gradient: f64,
+    /// v̄1 \[m/s\].
+    pub nozzle_m_per_s: f64,
+    /// ū3 \[m/s\].
+    pub strand_m_per_s: f64,
+}
+
+impl Strand {
+    /// A plant with both speeds in the steady state of its inputs.
+    pub fn steady(
+        model: StrandModel,
+        parameters: Parameters,
+        pressure_gradient: f64,
+        inputs: Inputs,
+    ) -> Self {
+        let (nozzle, strand) = (model.nozzle, model.strand);
+        let feed = nozzle.input_gain * inputs.mass_flow_kg_per_s;
+        let nozzle_m_per_s =
+            -(model.pressure_gain * pressure_gradient + feed) / nozzle.state_gain_per_s;
+        let pushed = model.push_per_s * model.swell * nozzle_m_per_s;
+        let drawn = strand.input_gain * inputs.plate_m_per_s;
+        let strand_m_per_s = -(pushed + drawn) / strand.state_gain_per_s;
+        Self { model, parameters, pressure_gradient, nozzle_m_per_s, strand_m_per_s }
+    }
+
+    /// Goes on for `dt_s` with inputs that are held and disturbances that run
+    /// straight from their first to their second value (Runge–Kutta, fourth
+    /// order).
+    pub fn step(&mut self, inputs: Inputs, feed: (f64, f64), plate: (f64, f64), dt_s: f64) {
+        let slope = |state: [f64; 2], part: f64| {
+            let at = |ends: (f64, f64)| ends.0 + part * (ends.1 - ends.0);
+            self.slope(
+                state,
+                inputs.mass_flow_kg_per_s + at(feed),
+                inputs.plate_m_per_s + at(plate),
+            )
+        };
+        let start = [self.nozzle_m_per_s, self.strand_m_per_s];
+        let along = |k: [f64; 2], h: f64| [start[0] + h * k[0], start[1] + h * k[1]];
+        let k1 = slope(start, 0.0);
+        let k2 = slope(along(k1, 0.5 * dt_s), 0.5);
+        let k3 = slope(along(k2, 0.5 * dt_s), 0.5);
+        let k4 = slope(along(k3, dt_s), 1.0);
+        let mean = |i: usize| (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]) / 6.0;
+        self.nozzle_m_per_s += dt_s * mean(0);
+        self.strand_m_per_s += dt_s * mean(1);
+    }
+
+    fn slope(&self, [nozzle, strand]: [f64; 2], feed: f64, plate: f64) -> [f64; 2] {
+        let model = &self.model;
+        let (by_feed, by_plate) = match self.parameters {
+            Parameters::Constant => (1.0, 1.0),
+            Parameters::WithInputs(at) => (feed / at.mass_flow_kg_per_s, plate / at.plate_m_per_s),
+        };
+        let pressure = model.pressure_gain * self.pressure_gradient;
+        let push = model.push_per_s * model.swell * nozzle;
+        let (first, second) = (model.nozzle, model.strand);
+        [
+            by_feed * (pressure + first.state_gain_per_s * nozzle + first.input_gain * feed),
+            by_plate * (push + second.state_gain_per_s * strand + second.input_gain * plate),
+        ]
+    }
+}
