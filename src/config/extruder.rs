@@ -101,6 +101,9 @@ impl Extruder {
     /// Reads `[extruder]`.
     pub fn read(table: &Table<'_>, folder: &Path) -> Option<Self> {
         let quantity = table.required_choice("command", &Quantity::WORDS);
+        if quantity.is_none() {
+            table.pass_over();
+        }
         let limits = quantity.and_then(|quantity| read_limits(table, quantity));
         let strategy = quantity.and_then(|quantity| read_strategy(table, folder, quantity, limits));
         let height = table.number("layer_height_mm", 1e-3..=1e4);
@@ -173,7 +176,11 @@ fn read_strategy(
     limits: Option<CommandLimits>,
 ) -> Option<Strategy> {
     let words = [("constant", Word::Constant), ("profile", Word::Profile)];
-    match table.required_choice("strategy", &words)? {
+    let word = table.required_choice("strategy", &words);
+    if word.is_none() {
+        table.pass_over();
+    }
+    match word? {
         Word::Constant => {
             let key = keys(quantity).value;
             let (low, high) = limits.map_or((f64::MIN, f64::MAX), |limits| limits.range());
@@ -226,7 +233,11 @@ pub enum PlantKind {
 impl ExtruderPlant {
     /// Reads `[extruder_plant]`.
     pub fn read(table: &Table<'_>) -> Option<Self> {
-        let kind = table.required_choice("kind", &[("direct", ())]).and_then(|()| {
+        let kind = table.required_choice("kind", &[("direct", ())]);
+        if kind.is_none() {
+            table.pass_over();
+        }
+        let kind = kind.and_then(|()| {
             table
                 .number("gain_mm3_per_s", 1e-9..=1e12)
                 .map(|gain_mm3_per_s| PlantKind::Direct { gain_mm3_per_s })

@@ -1,7 +1,7 @@
 //! A cursor over a TOML file that takes what it is asked for and collects
 //! every violation on the way, with its line, instead of ending at the first.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
@@ -41,6 +41,7 @@ impl<'a> Document<'a> {
             line: None,
             strict: true,
             asked: RefCell::default(),
+            passed_over: Cell::new(false),
         }
     }
 
@@ -88,9 +89,16 @@ pub struct Table<'a> {
     line: Option<usize>,
     strict: bool,
     asked: RefCell<BTreeSet<&'static str>>,
+    passed_over: Cell<bool>,
 }
 
 impl<'a> Table<'a> {
+    /// Lets unknown keys of this table pass: which there may be hangs on one
+    /// that is wrong.
+    pub fn pass_over(&self) {
+        self.passed_over.set(true);
+    }
+
     fn child(&self, key: &'static str, items: Option<&'a DeTable<'a>>, strict: bool) -> Table<'a> {
         let value = self.get(key);
         Table {
@@ -100,6 +108,7 @@ impl<'a> Table<'a> {
             line: value.map(|value| self.document.line_of(value.span().start)),
             strict,
             asked: RefCell::default(),
+            passed_over: Cell::new(false),
         }
     }
 
@@ -313,6 +322,9 @@ impl<'a> Table<'a> {
 
 impl Drop for Table<'_> {
     fn drop(&mut self) {
+        if self.passed_over.get() {
+            return;
+        }
         let asked = self.asked.borrow();
         for key in self.items.into_iter().flat_map(|items| items.keys()) {
             let name = key.get_ref().as_ref();

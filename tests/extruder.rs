@@ -1,0 +1,107 @@
+//! The extruder side as a user meets it: cell files, simulation, messages.
+
+#![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use assert_cmd::Command;
+
+const CELL: &str = include_str!("../cells/extruder.toml");
+
+fn truebead(folder: &Path, args: &[&str]) -> Output {
+    Command::cargo_bin("truebead").unwrap().current_dir(folder).args(args).output().unwrap()
+}
+
+/// Simulates the shipped cell with some lines changed; gives status, standard
+/// error and the summary, if there is one.
+fn simulated(changes: &[(&str, &str)]) -> (Option<i32>, String, serde_json::Value) {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = CELL.to_owned();
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from}");
+        text = text.replace(from, to);
+    }
+    fs::write(folder.path().join("cell.toml"), text).unwrap();
+    let output = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out"]);
+    let summary = fs::read_to_string(folder.path().join("out/summary.json"))
+        .map_or(serde_json::Value::Null, |text| serde_json::from_str(&text).unwrap());
+    let said = String::from_utf8(output.stderr).unwrap();
+    (output.status.code(), said, summary)
+}
+
+#[test]
+fn both_sides_run_together() {
+    let (status, said, summary) = simulated(&[]);
+    assert_eq!(status, Some(0), "{said}");
+    let side = &summary["extruder"];
+    assert!(side["states_s"]["running"].as_f64().unwrap() > 10.0, "{side}");
+    assert!(side["commands"].as_u64().unwrap() > 500, "{side}");
+    assert_eq!(summary["faults"], 0);
+    assert!(summary["width_error_rms_settled_mm"].as_f64().unwrap() < 1.0, "{summary}");
+}
+
+#[test]
+fn a_pump_that_never_starts_stops_the_robot_with_the_reason() {
+    let (status, said, summary) = simulated(&[("start_delay_s = 0.1", "start_delay_s = 9.0")]);
+    assert_eq!(status, Some(1), "{said}");
+    assert_eq!(summary["fault_reasons"]["extruder_did_not_start"], 1, "{summary}");
+    assert_eq!(summary["extruder"]["fault_reasons"]["did_not_start"], 1, "{summary}");
+}
+
+#[test]
+fn half_the_flow_is_answered_by_the_robot_as_far_as_its_limits_go() {
+    let (_, _, summary) = simulated(&[("constant_rpm = 60.0", "constant_rpm = 45.0")]);
+    let (_, _, full) = simulated(&[]);
+    let limited = |summary: &serde_json::Value| summary["limited_s"].as_f64().unwrap();
+    assert!(limited(&summary) > limited(&full), "{summary}");
+}
+
+#[test]
+fn every_violation_is_told_at_once_with_its_line() {
+    let (status, said, _) = simulated(&[
+        ("max_rpm = 90.0", "max_rpm = -90.0"),
+        ("strategy = \"constant\"", "strategy = \"constnat\""),
+        ("layer_height_mm = 20.0", "layer_height_mm = 60.0"),
+        ("kind = \"direct\"", "kind = \"magic\""),
+    ]);
+    assert_eq!(status, Some(2));
+    for part in ["extruder.max_rpm", "extruder.strategy", "extruder_plant.kind", "line "] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+}
+
+#[test]
+fn a_bead_narrower_than_it_is_high_is_refused() {
+    let (status, said, _) = simulated(&[("layer_height_mm = 20.0", "layer_height_mm = 60.0")]);
+    assert_eq!(status, Some(2));
+    assert!(said.contains("extruder.layer_height_mm"), "{said}");
+}
+
+#[test]
+fn a_simulation_without_a_plant_says_what_is_missing() {
+    let cut = CELL.find("[extruder_plant]").unwrap();
+    let end = CELL.find("[simulation]").unwrap();
+    let (status, said, _) = simulated(&[(&CELL[cut..end], "")]);
+    assert_eq!(status, Some(2));
+    assert!(said.contains("[extruder_plant]"), "{said}");
+}
+
+#[test]
+fn a_profile_is_played_and_a_bad_one_has_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = CELL.replace(
+        "strategy = \"constant\"\nconstant_rpm = 60.0",
+        "strategy = \"profile\"\nprofile = \"steps.csv\"",
+    );
+    fs::write(folder.path().join("cell.toml"), text).unwrap();
+    fs::write(folder.path().join("steps.csv"), "time_s,screw_rpm\n0,60\n5,70\n9,55\n").unwrap();
+    let output = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out"]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    fs::write(folder.path().join("steps.csv"), "time_s,screw_rpm\n0,60\n5,fast\n").unwrap();
+    let output = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out2"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_ne!(output.status.code(), Some(0));
+    assert!(said.contains("line 3") && said.contains("`fast`"), "{said}");
+}
