@@ -4,6 +4,7 @@
 pub mod align;
 pub mod excitation;
 pub mod experiment;
+pub mod fit;
 pub mod flow;
 pub mod grid;
 pub mod hampel;

@@ -1,6 +1,7 @@
 //! The simulated cell: a bead, the world around it and the pictures of it.
 
 pub mod barjuei2022;
+pub mod bcs_thesis;
 pub mod bead;
 pub mod bend;
 pub mod boards;

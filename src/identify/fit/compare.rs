@@ -1,0 +1,152 @@
+//! Several models of the same data, and which of them to take.
+
+use super::error::FitError;
+use super::quality::Quality;
+use super::report::Fit;
+use super::samples::Samples;
+use super::settings::{Before, Settings};
+use super::spread::Colour;
+
+/// One of the models that were compared.
+#[derive(Debug, Clone)]
+pub struct Row {
+    /// What was fitted.
+    pub settings: Settings,
+    /// The fit, or why there is none.
+    pub fit: Result<Fit, FitError>,
+    /// On the data of the validation, where there are such.
+    pub validation: Option<Quality>,
+    /// Schwarz's criterion with as many samples as are independent in the
+    /// residuals of the best model; less is better. `None` without a fit.
+    pub bic: Option<f64>,
+}
+
+/// All of them, and which to take.
+#[derive(Debug, Clone)]
+pub struct Comparison {
+    /// In the order in which they were given.
+    pub rows: Vec<Row>,
+    /// The row to take; `None` where no fit stands.
+    pub chosen: Option<usize>,
+    /// Why this one, in words.
+    pub reason: String,
+}
+
+/// Fits a list of models and chooses one. With validation data and what came
+/// before them: the one with the fewest parameters whose squared errors there are
+/// above the least by no more than the standard error of the difference. Without: the
+/// one with the least BIC, counted in independent samples. Models whose parameters
+/// the data do not determine are shown and not chosen.
+pub fn compare(
+    estimation: &Samples,
+    validation: Option<(&Samples, Before)>,
+    candidates: &[Settings],
+) -> Comparison {
+    let mut rows = Vec::new();
+    let mut errors: Vec<Option<Vec<f64>>> = Vec::new();
+    for settings in candidates {
+        let fit = super::fit(estimation, &Settings { accept_undetermined: true, ..*settings });
+        let (quality, squares) = match (&fit, validation) {
+            (Ok(fit), Some((samples, before))) => on(fit, samples, before),
+            _ => (None, None),
+        };
+        rows.push(Row { settings: *settings, fit, validation: quality, bic: None });
+        errors.push(squares);
+    }
+    fill_bic(&mut rows);
+    let (chosen, reason) = match validation {
+        Some(_) => by_validation(&rows, &errors),
+        None => by_bic(&rows),
+    };
+    Comparison { rows, chosen, reason }
+}
+
+/// Quality and squared errors on other data.
+fn on(fit: &Fit, samples: &Samples, before: Before) -> (Option<Quality>, Option<Vec<f64>>) {
+    let Ok(predicted) = fit.predict(samples, before) else { return (None, None) };
+    let squares = samples.output().iter().zip(&predicted).map(|(y, p)| (y - p) * (y - p));
+    (Quality::of(samples.output(), &predicted), Some(squares.collect()))
+}
+
+fn fill_bic(rows: &mut [Row]) {
+    let fits = || rows.iter().filter_map(|row| row.fit.as_ref().ok());
+    let best = fits().min_by(|a, b| a.residual_sigma.total_cmp(&b.residual_sigma));
+    let Some(independent) = best.map(|fit| fit.independent_samples) else { return };
+    for row in rows {
+        row.bic = row.fit.as_ref().ok().map(|fit| {
+            let variance = (fit.quality.rmse * fit.quality.rmse).max(f64::MIN_POSITIVE);
+            #[expect(clippy::cast_precision_loss, reason = "few parameters")]
+            let k = fit.estimated as f64;
+            independent * libm::log(variance) + k * libm::log(independent.max(2.0))
+        });
+    }
+}
+
+fn stands(row: &Row) -> bool {
+    row.fit.as_ref().is_ok_and(Fit::is_determined)
+}
+
+fn named(row: &Row) -> String {
+    let structure = row.settings.structure;
+    format!("{} poles and {} zeros", structure.poles(), structure.zeros())
+}
+
+const NONE: &str = "no model stands; see why beside each";
+
+fn by_bic(rows: &[Row]) -> (Option<usize>, String) {
+    let standing = (0..rows.len()).filter(|&i| stands(&rows[i]));
+    let of = |i: usize| rows[i].bic.unwrap_or(f64::MAX);
+    let Some(chosen) = standing.min_by(|a, b| of(*a).total_cmp(&of(*b))) else {
+        return (None, NONE.to_owned());
+    };
+    let reason = format!(
+        "{}: the least BIC, {:.1}, over independent samples; there are no validation data",
+        named(&rows[chosen]),
+        of(chosen)
+    );
+    (Some(chosen), reason)
+}
+
+fn by_validation(rows: &[Row], errors: &[Option<Vec<f64>>]) -> (Option<usize>, String) {
+    let fit = |i: usize| rows[i].validation.map_or(f64::MIN, |quality| quality.fit_percent);
+    let standing: Vec<usize> =
+        (0..rows.len()).filter(|&i| stands(&rows[i]) && errors[i].is_some()).collect();
+    let Some(&best) = standing.iter().max_by(|a, b| fit(**a).total_cmp(&fit(**b))) else {
+        return (None, NONE.to_owned());
+    };
+    let size = |i: usize| rows[i].fit.as_ref().map_or(usize::MAX, |fit| fit.estimated);
+    let as_good = |i: usize| match (&errors[i], &errors[best]) {
+        (Some(a), Some(b)) => i == best || no_worse(a, b),
+        _ => false,
+    };
+    let chosen = standing
+        .iter()
+        .copied()
+        .filter(|&i| as_good(i))
+        .min_by(|a, b| size(*a).cmp(&size(*b)).then(fit(*b).total_cmp(&fit(*a))))
+        .unwrap_or(best);
+    let reason = if chosen == best {
+        format!("{}: the best fit on the validation data, {:.1} %", named(&rows[best]), fit(best))
+    } else {
+        format!(
+            "{}: {:.1} % on the validation data, with fewer parameters than {} of {:.1} %, which \
+             is better by less than the standard error of the difference",
+            named(&rows[chosen]),
+            fit(chosen),
+            named(&rows[best]),
+            fit(best)
+        )
+    };
+    (Some(chosen), reason)
+}
+
+/// Whether the mean of squared errors lies above another by no more than the
+/// standard error of their difference.
+#[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
+fn no_worse(a: &[f64], b: &[f64]) -> bool {
+    let n = a.len().min(b.len());
+    let mean = a.iter().zip(b).map(|(a, b)| a - b).sum::<f64>() / n.max(1) as f64;
+    let about: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b - mean).collect();
+    let variance = about.iter().map(|d| d * d).sum::<f64>() / n.max(1) as f64;
+    mean <= (variance / Colour::of(&about).independent(n)).sqrt()
+}

@@ -1,0 +1,109 @@
+//! Why there is no fit.
+
+use super::samples::DataError;
+use crate::model::ModelError;
+
+/// Why there is no fit, with what was found.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FitError {
+    /// The data themselves.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// A number of poles and zeros that is not fitted.
+    #[error("{poles} poles and {zeros} zeros; give 1 to 4 poles and at most as many zeros")]
+    Order {
+        /// What was asked for.
+        poles: usize,
+        /// What was asked for.
+        zeros: usize,
+    },
+    /// A range of dead times that is none.
+    #[error(
+        "a dead time of {least_s} to {most_s} s; give a range that begins at 0 or above and ends \
+         above that, by half the record ({most_allowed_s:.3} s) at the latest"
+    )]
+    DeadTimeRange {
+        /// Lower end \[s\].
+        least_s: f64,
+        /// Upper end \[s\].
+        most_s: f64,
+        /// Latest upper end \[s\].
+        most_allowed_s: f64,
+    },
+    /// Fewer samples than the parameters need.
+    #[error("{found} samples for {parameters} parameters; it needs at least {needed}")]
+    TooFewForParameters {
+        /// Samples.
+        found: usize,
+        /// Parameters.
+        parameters: usize,
+        /// Samples that would do.
+        needed: usize,
+    },
+    /// The best model hardly differs from a constant.
+    #[error(
+        "the output does not depend on the input: the best model explains {explained_percent:.2} % \
+         of its variance, and {chance_percent:.2} % could be chance; look whether the columns are \
+         the right ones, or excite the input more"
+    )]
+    NoDependence {
+        /// Share of the output's variance that the model explains \[%\].
+        explained_percent: f64,
+        /// Share that a model might explain of noise alone \[%\].
+        chance_percent: f64,
+    },
+    /// A pole at the edge of stability.
+    #[error(
+        "the fit runs against the edge of stability: a pole at {re:.3e} 1/s, slower than ten \
+         records of {record_s:.1} s; the output drifts or integrates, or the record is too short \
+         to see it settle"
+    )]
+    UnstableFit {
+        /// Real part of the pole \[1/s\].
+        re: f64,
+        /// Length of the record \[s\].
+        record_s: f64,
+    },
+    /// The dead time ran into the end of its range.
+    #[error(
+        "the dead time runs against the {end} end of its range, {bound_s} s; widen the range, or \
+         look whether input and output are on one clock"
+    )]
+    DeadTimeAtBound {
+        /// `lower` or `upper`.
+        end: &'static str,
+        /// That end \[s\].
+        bound_s: f64,
+    },
+    /// Real poles were asked for and the data oscillate.
+    #[error(
+        "two real poles were asked for, but the data say a damping of {damping:.2}; take the \
+         oscillating second order"
+    )]
+    PolesNotReal {
+        /// ζ of the best fit.
+        damping: f64,
+    },
+    /// More parameters than the data can tell apart.
+    #[error(
+        "the data do not determine {parameter}: {value:.4} with a standard error of {sigma:.2e}; \
+         take fewer poles or zeros, or excite the input more"
+    )]
+    Undetermined {
+        /// Its name.
+        parameter: String,
+        /// What came out.
+        value: f64,
+        /// Its standard error; infinite where nothing holds it.
+        sigma: f64,
+    },
+    /// Nothing that could be started from.
+    #[error(
+        "no model of this form could be started: the output does not follow the input with any \
+         dead time in the range"
+    )]
+    NoStart,
+    /// A model that cannot be.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}

@@ -1,0 +1,148 @@
+//! Least squares: in one go where it is linear, and by Levenberg's and
+//! Marquardt's steps within ranges where it is not.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::problem::{Problem, dot};
+
+/// Where the steps ended.
+#[derive(Debug, Clone)]
+pub(super) struct Outcome {
+    pub theta: Vec<f64>,
+    /// Sum of the squared residuals.
+    pub squares: f64,
+}
+
+/// Coefficients of the columns that together come nearest to a row, the smallest
+/// such where columns repeat each other.
+pub(super) fn nearest(columns: &[Vec<f64>], target: &[f64]) -> Option<Vec<f64>> {
+    let sizes: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt().max(f64::MIN_POSITIVE)).collect();
+    let n = columns.len();
+    let normal = normal_matrix(columns, &sizes);
+    let right = DVector::from_fn(n, |i, _| dot(&columns[i], target) / sizes[i]);
+    let solved = normal.svd(true, true).solve(&right, 1e-13).ok()?;
+    let found: Vec<f64> = solved.iter().zip(&sizes).map(|(x, size)| x / size).collect();
+    found.iter().all(|x| x.is_finite()).then_some(found)
+}
+
+/// All products of columns that are divided by sizes.
+pub(super) fn normal_matrix(columns: &[Vec<f64>], sizes: &[f64]) -> DMatrix<f64> {
+    let n = columns.len();
+    let mut normal = DMatrix::zeros(n, n);
+    for i in 0..n {
+        for j in 0..=i {
+            let product = dot(&columns[i], &columns[j]) / (sizes[i] * sizes[j]);
+            normal[(i, j)] = product;
+            normal[(j, i)] = product;
+        }
+    }
+    normal
+}
+
+/// Puts the parameters that act in proportion where they fit best.
+pub(super) fn fill_linear(problem: &Problem, theta: &mut [f64]) -> Option<f64> {
+    let (numbers, columns) = problem.linear_columns(theta)?;
+    let known = match problem.level {
+        super::Level::Known(level) => level,
+        super::Level::Estimated => 0.0,
+    };
+    let target: Vec<f64> = problem.output.iter().map(|y| y - known).collect();
+    let found = nearest(&columns, &target)?;
+    let mut left = target;
+    for ((number, value), column) in numbers.into_iter().zip(&found).zip(&columns) {
+        theta[number] = *value;
+        for (left, c) in left.iter_mut().zip(column) {
+            *left -= value * c;
+        }
+    }
+    Some(dot(&left, &left))
+}
+
+fn residuals(problem: &Problem, theta: &[f64]) -> Option<Vec<f64>> {
+    let predicted = problem.predict(theta)?;
+    Some(problem.output.iter().zip(&predicted).map(|(y, p)| y - p).collect())
+}
+
+/// Steps downhill from a start until nothing is gained. `None` where the start
+/// is no stable model.
+pub(super) fn descend(problem: &Problem, start: &[f64], most_steps: usize) -> Option<Outcome> {
+    let mut theta = start.to_vec();
+    problem.project(&mut theta);
+    let mut left = residuals(problem, &theta)?;
+    let mut squares = dot(&left, &left);
+    let mut damping = 1e-3;
+    for _ in 0..most_steps {
+        let scales = problem.scales(&theta);
+        let Some(columns) = problem.jacobian(&theta, &scales) else { break };
+        let slope: Vec<f64> = columns.iter().map(|c| dot(c, &left)).collect();
+        let normal = held_normal(problem, &theta, &columns, &slope);
+        let before = squares;
+        let mut moved_by = 0.0_f64;
+        for _ in 0..12 {
+            let Some(step) = damped(&normal, damping) else {
+                damping *= 10.0;
+                continue;
+            };
+            let mut next = theta.clone();
+            for (value, step) in next.iter_mut().zip(&step) {
+                *value += step;
+            }
+            problem.project(&mut next);
+            let tried = residuals(problem, &next).map(|left| (dot(&left, &left), left));
+            match tried {
+                Some((less, new)) if less < squares => {
+                    moved_by = relative_step(&theta, &next, &scales);
+                    (theta, squares, left) = (next, less, new);
+                    damping = (damping * 0.1).max(1e-12);
+                    break;
+                }
+                _ => damping *= 10.0,
+            }
+        }
+        if before - squares <= 1e-11 * before && moved_by < 1e-6 || squares == before {
+            break;
+        }
+    }
+    Some(Outcome { theta, squares })
+}
+
+fn relative_step(from: &[f64], to: &[f64], scales: &[f64]) -> f64 {
+    let parts = from.iter().zip(to).zip(scales).map(|((a, b), scale)| ((b - a) / scale).abs());
+    parts.fold(0.0, f64::max)
+}
+
+/// Normal equations of the parameters that may move.
+struct Normal {
+    matrix: DMatrix<f64>,
+    right: DVector<f64>,
+    sizes: Vec<f64>,
+}
+
+/// A parameter at an end of its range that would go beyond is held.
+fn held_normal(problem: &Problem, theta: &[f64], columns: &[Vec<f64>], slope: &[f64]) -> Normal {
+    let sizes: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt().max(f64::MIN_POSITIVE)).collect();
+    let mut matrix = normal_matrix(columns, &sizes);
+    let mut right = DVector::from_fn(columns.len(), |i, _| slope[i] / sizes[i]);
+    for number in 0..theta.len() {
+        let [least, most] = problem.range(theta, number);
+        let out = (theta[number] <= least && slope[number] < 0.0)
+            || (theta[number] >= most && slope[number] > 0.0);
+        if out {
+            matrix.row_mut(number).fill(0.0);
+            matrix.column_mut(number).fill(0.0);
+            matrix[(number, number)] = 1.0;
+            right[number] = 0.0;
+        }
+    }
+    Normal { matrix, right, sizes }
+}
+
+fn damped(normal: &Normal, damping: f64) -> Option<Vec<f64>> {
+    let mut matrix = normal.matrix.clone();
+    for i in 0..matrix.nrows() {
+        matrix[(i, i)] *= 1.0 + damping;
+    }
+    let step = matrix.cholesky()?.solve(&normal.right);
+    let step: Vec<f64> = step.iter().zip(&normal.sizes).map(|(x, size)| x / size).collect();
+    step.iter().all(|x| x.is_finite()).then_some(step)
+}

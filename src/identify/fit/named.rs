@@ -1,0 +1,108 @@
+//! The parameters under the names of the form that was asked for.
+
+use nalgebra::DMatrix;
+
+use super::error::FitError;
+use super::problem::Problem;
+use super::settings::Structure;
+
+/// Names and values.
+pub(super) struct Named {
+    pub names: Vec<String>,
+    pub values: Vec<f64>,
+    pub poles_are_real: bool,
+}
+
+impl Named {
+    /// Fails where real poles were asked for and the poles are not.
+    pub fn of(problem: &Problem, structure: Structure, theta: &[f64]) -> Result<Self, FitError> {
+        let mut named = Self { names: Vec::new(), values: Vec::new(), poles_are_real: false };
+        let alpha = |i: usize| theta[problem.zeros + i];
+        match structure {
+            Structure::FirstOrder { zero } => {
+                named.gain(theta, zero);
+                named.push("time_constant_s", alpha(1));
+            }
+            Structure::SecondOrderReal { zero } => {
+                named.gain(theta, zero);
+                let (half, product) = (0.5 * alpha(1), alpha(2));
+                let root = half * half - product;
+                if root < 0.0 {
+                    return Err(FitError::PolesNotReal { damping: half / product.sqrt() });
+                }
+                named.push("time_constant_1_s", half + root.sqrt());
+                named.push("time_constant_2_s", product / (half + root.sqrt()));
+            }
+            Structure::SecondOrderOscillating { zero } => {
+                named.gain(theta, zero);
+                let period_s = alpha(2).sqrt();
+                let damping = 0.5 * alpha(1) / period_s;
+                named.push("period_s", period_s);
+                named.push("damping", damping);
+                named.poles_are_real = damping > 1.0;
+            }
+            Structure::Transfer { poles, zeros } => {
+                let lead = alpha(poles);
+                for i in (0..=zeros).rev() {
+                    named.push(&format!("b{i}"), theta[i] / lead);
+                }
+                for i in (0..poles).rev() {
+                    let over = if i == 0 { 1.0 } else { alpha(i) };
+                    named.push(&format!("a{i}"), over / lead);
+                }
+            }
+        }
+        let layout = problem.layout();
+        for (name, place) in [("dead_time_s", layout.dead_time), ("output_level", layout.level)] {
+            if let Some(place) = place {
+                named.push(name, theta[place]);
+            }
+        }
+        Ok(named)
+    }
+
+    fn gain(&mut self, theta: &[f64], zero: bool) {
+        self.push("gain", theta[0]);
+        if zero {
+            self.push("zero_s", theta[1] / theta[0]);
+        }
+    }
+
+    fn push(&mut self, name: &str, value: f64) {
+        self.names.push(name.to_owned());
+        self.values.push(value);
+    }
+
+    /// How the named parameters answer to those of the fit, by differences.
+    pub fn slopes(
+        &self,
+        problem: &Problem,
+        structure: Structure,
+        theta: &[f64],
+        scales: &[f64],
+    ) -> DMatrix<f64> {
+        let mut slopes = DMatrix::zeros(self.names.len(), theta.len());
+        for (number, scale) in scales.iter().enumerate() {
+            let mut moved = theta.to_vec();
+            // Small against the parameter itself, which may be far below its scale.
+            let step = STEP * if theta[number] == 0.0 { *scale } else { theta[number].abs() };
+            let mut at = |by: f64| {
+                moved[number] = theta[number] + by;
+                Self::of(problem, structure, &moved).ok().map(|named| named.values)
+            };
+            let (down, up) = (at(-step), at(step));
+            let width = step * f64::from(u8::from(down.is_some()) + u8::from(up.is_some()));
+            let (low, high) = (
+                down.unwrap_or_else(|| self.values.clone()),
+                up.unwrap_or_else(|| self.values.clone()),
+            );
+            for (row, (low, high)) in low.iter().zip(&high).enumerate() {
+                slopes[(row, number)] = if width > 0.0 { (high - low) / width } else { 0.0 };
+            }
+        }
+        slopes
+    }
+}
+
+/// Step of the differences as a part of the parameter.
+const STEP: f64 = 1e-6;

@@ -1,0 +1,288 @@
+//! The fit as numbers: what parameters predict, and how that answers to them.
+//!
+//! The parameters are those of b(s)/a(s) with a denominator that ends in 1, so
+//! that a pole which the data do not show goes to a coefficient of zero: the
+//! numerator β0…βm, the denominator α1…αn (each with the power of s that it stands
+//! before), then dead time, output level and the free response where they are
+//! estimated.
+
+use super::samples::Samples;
+use super::settings::{Before, DeadTime, Level, Settings};
+use crate::model::{Between, ModelError, Simulator, TransferFunction, polynomial};
+
+/// A pole faster than this many in a step is not seen.
+const FASTEST_PER_STEP: f64 = 50.0;
+/// A time constant longer than this many records is an integrator.
+const SLOWEST_RECORDS: f64 = 100.0;
+
+/// What is fitted to what.
+#[derive(Debug, Clone)]
+pub(super) struct Problem {
+    /// Less the input level.
+    pub input: Vec<f64>,
+    pub input_level: f64,
+    pub output: Vec<f64>,
+    pub dt_s: f64,
+    pub poles: usize,
+    pub zeros: usize,
+    pub dead_time: DeadTime,
+    pub level: Level,
+    pub free: bool,
+    pub between: Between,
+}
+
+/// Numbers of the parameters.
+pub(super) struct Layout {
+    pub poles_from: usize,
+    pub dead_time: Option<usize>,
+    pub level: Option<usize>,
+    pub free_from: usize,
+    pub total: usize,
+}
+
+impl Problem {
+    pub fn new(samples: &Samples, settings: &Settings) -> Self {
+        let first = samples.input().first().copied().unwrap_or(0.0);
+        let input_level = match settings.before {
+            Before::Settled { input } => input,
+            Before::SettledAtFirst | Before::Unknown => first,
+        };
+        Self {
+            input: samples.input().iter().map(|u| u - input_level).collect(),
+            input_level,
+            output: samples.output().to_vec(),
+            dt_s: samples.dt_s(),
+            poles: settings.structure.poles(),
+            zeros: settings.structure.zeros(),
+            dead_time: settings.dead_time,
+            level: settings.level,
+            free: settings.before == Before::Unknown,
+            between: settings.between,
+        }
+    }
+
+    pub fn layout(&self) -> Layout {
+        let poles_from = self.zeros + 1;
+        let mut total = poles_from + self.poles;
+        let mut next = |is: bool| {
+            total += usize::from(is);
+            is.then(|| total - 1)
+        };
+        let dead_time = next(matches!(self.dead_time, DeadTime::Estimated { .. }));
+        let level = next(self.level == Level::Estimated);
+        let free_from = total;
+        total += if self.free { self.poles } else { 0 };
+        Layout { poles_from, dead_time, level, free_from, total }
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
+    pub fn duration_s(&self) -> f64 {
+        self.output.len() as f64 * self.dt_s
+    }
+
+    /// Denominator of a set of parameters, highest power first.
+    pub fn den(&self, theta: &[f64]) -> Vec<f64> {
+        let from = self.zeros + 1;
+        theta[from..from + self.poles].iter().rev().copied().chain([1.0]).collect()
+    }
+
+    pub fn dead_time_s(&self, theta: &[f64]) -> f64 {
+        match self.dead_time {
+            DeadTime::Given(given) => given,
+            DeadTime::Estimated { .. } => theta[self.zeros + 1 + self.poles],
+        }
+    }
+
+    pub fn transfer(&self, theta: &[f64]) -> Option<TransferFunction> {
+        let num: Vec<f64> = theta[..=self.zeros].iter().rev().copied().collect();
+        TransferFunction::new(&num, &self.den(theta), self.dead_time_s(theta)).ok()
+    }
+
+    pub fn output_level(&self, theta: &[f64]) -> f64 {
+        match self.level {
+            Level::Known(level) => level,
+            Level::Estimated => self.layout().level.map_or(0.0, |place| theta[place]),
+        }
+    }
+
+    /// Whether these are parameters of a stable model at all.
+    fn possible(&self, theta: &[f64]) -> bool {
+        let slow = theta[self.zeros + 1] > SLOWEST_RECORDS * self.duration_s();
+        !slow && theta.iter().all(|p| p.is_finite()) && polynomial::is_hurwitz(&self.den(theta))
+    }
+
+    /// The output that they predict; `None` of what is no stable model.
+    pub fn predict(&self, theta: &[f64]) -> Option<Vec<f64>> {
+        if !self.possible(theta) {
+            return None;
+        }
+        let level = self.output_level(theta);
+        let mut model = Simulator::new(&self.transfer(theta)?, self.dt_s, self.between).ok()?;
+        let mut predicted: Vec<f64> = self.input.iter().map(|u| level + model.step(*u)).collect();
+        if self.free {
+            let layout = self.layout();
+            let own: Vec<f64> = theta[layout.free_from..].iter().rev().copied().collect();
+            let own = free_response(&own, &self.den(theta), self.dt_s, predicted.len()).ok()?;
+            predicted.iter_mut().zip(own).for_each(|(y, own)| *y += own);
+        }
+        Some(predicted)
+    }
+
+    /// The answers of all parameters that act in proportion – numerator, level, free
+    /// response – for a denominator and dead time, and the numbers of these
+    /// parameters.
+    pub fn linear_columns(&self, theta: &[f64]) -> Option<(Vec<usize>, Vec<Vec<f64>>)> {
+        if !self.possible(theta) {
+            return None;
+        }
+        let layout = self.layout();
+        let (den, dead_time_s) = (self.den(theta), self.dead_time_s(theta));
+        let mut numbers = Vec::new();
+        let mut columns = Vec::new();
+        for i in 0..=self.zeros {
+            let tf = TransferFunction::new(&power(i), &den, dead_time_s).ok()?;
+            let mut model = Simulator::new(&tf, self.dt_s, self.between).ok()?;
+            numbers.push(i);
+            columns.push(self.input.iter().map(|u| model.step(*u)).collect());
+        }
+        if let Some(place) = layout.level {
+            numbers.push(place);
+            columns.push(vec![1.0; self.output.len()]);
+        }
+        if self.free {
+            numbers.extend(layout.free_from..layout.total);
+            columns.extend(free_responses(&den, self.dt_s, self.output.len()).ok()?);
+        }
+        Some((numbers, columns))
+    }
+
+    /// Sizes that the parameters have, for steps and for the balance of the
+    /// equations.
+    pub fn scales(&self, theta: &[f64]) -> Vec<f64> {
+        let layout = self.layout();
+        let tiny = f64::MIN_POSITIVE;
+        let mut time = 0.0_f64;
+        for i in 1..=self.poles {
+            let alpha = theta[layout.poles_from + i - 1].abs();
+            time = time.max(libm::pow(alpha, 1.0 / exponent(i)));
+        }
+        let time = time.max(self.dt_s);
+        let unit = |i: usize| libm::pow(time, exponent(i));
+        let gain = (0..=self.zeros).map(|i| theta[i].abs() / unit(i)).fold(tiny, f64::max);
+        let mut scales: Vec<f64> = (0..=self.zeros).map(|i| gain * unit(i)).collect();
+        scales.extend((1..=self.poles).map(unit));
+        if layout.dead_time.is_some() {
+            scales.push(time);
+        }
+        let swing = spread(&self.output).max(tiny);
+        if layout.level.is_some() {
+            scales.push(swing);
+        }
+        scales.extend((0..layout.total - layout.free_from).map(|i| swing * unit(i)));
+        scales
+    }
+
+    /// Ends of the range of a parameter, some of which hang on others.
+    pub fn range(&self, theta: &[f64], number: usize) -> [f64; 2] {
+        let layout = self.layout();
+        if Some(number) == layout.dead_time
+            && let DeadTime::Estimated { least_s, most_s } = self.dead_time
+        {
+            return [least_s, most_s];
+        }
+        let last_pole = layout.poles_from + self.poles - 1;
+        if number == last_pole {
+            let before = if self.poles == 1 { 1.0 } else { theta[last_pole - 1].abs() };
+            return [before * self.dt_s / FASTEST_PER_STEP, f64::MAX];
+        }
+        [f64::MIN, f64::MAX]
+    }
+
+    /// The parameters within their ranges.
+    pub fn project(&self, theta: &mut [f64]) {
+        for number in 0..theta.len() {
+            let [least, most] = self.range(theta, number);
+            theta[number] = theta[number].clamp(least, most);
+        }
+    }
+
+    /// Slope of the prediction with every parameter; `None` beside the edge of
+    /// what is stable.
+    pub fn jacobian(&self, theta: &[f64], scales: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let (numbers, linear) = self.linear_columns(theta)?;
+        let mut columns = vec![Vec::new(); theta.len()];
+        for (number, column) in numbers.into_iter().zip(linear) {
+            columns[number] = column;
+        }
+        for number in 0..theta.len() {
+            if columns[number].is_empty() {
+                columns[number] = self.slope(theta, number, STEP * scales[number])?;
+            }
+        }
+        Some(columns)
+    }
+
+    /// By central differences, one-sided at an end of the range.
+    fn slope(&self, theta: &[f64], number: usize, step: f64) -> Option<Vec<f64>> {
+        let [least, most] = self.range(theta, number);
+        let moved = |by: f64| {
+            let mut moved = theta.to_vec();
+            moved[number] = (theta[number] + by).clamp(least, most);
+            self.predict(&moved).map(|y| (moved[number], y))
+        };
+        let here = || self.predict(theta).map(|y| (theta[number], y));
+        let (from, low) = moved(-step).or_else(here)?;
+        let (to, high) = moved(step).or_else(here)?;
+        Some(high.iter().zip(&low).map(|(a, b)| (a - b) / (to - from)).collect())
+    }
+}
+
+/// s to a power, as a numerator.
+fn power(i: usize) -> Vec<f64> {
+    let mut num = vec![0.0; i + 1];
+    num[0] = 1.0;
+    num
+}
+
+/// What a state that is not at rest does by itself: the answer of c(s)/a(s) to a
+/// pulse one sample before the first.
+fn free_response(
+    num: &[f64],
+    den: &[f64],
+    dt_s: f64,
+    samples: usize,
+) -> Result<Vec<f64>, ModelError> {
+    let tf = TransferFunction::new(num, den, 0.0)?;
+    let mut model = Simulator::new(&tf, dt_s, Between::Held)?;
+    let _ = model.step(1.0);
+    Ok((0..samples).map(|_| model.step(0.0)).collect())
+}
+
+/// The same for c = 1, s, …: together all that a state can do by itself.
+pub(super) fn free_responses(
+    den: &[f64],
+    dt_s: f64,
+    samples: usize,
+) -> Result<Vec<Vec<f64>>, ModelError> {
+    (0..den.len() - 1).map(|i| free_response(&power(i), den, dt_s, samples)).collect()
+}
+
+/// Step of the differences as a part of a parameter's size.
+const STEP: f64 = 1e-5;
+
+#[expect(clippy::cast_precision_loss, reason = "an order is small")]
+fn exponent(i: usize) -> f64 {
+    i as f64
+}
+
+/// Standard deviation of a row.
+pub(super) fn spread(row: &[f64]) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
+    let n = row.len() as f64;
+    let mean = row.iter().sum::<f64>() / n;
+    (row.iter().map(|y| (y - mean) * (y - mean)).sum::<f64>() / n).sqrt()
+}
+
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}

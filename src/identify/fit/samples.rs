@@ -1,0 +1,346 @@
+//! Samples of an input and an output, and whether a model can be told from
+//! them.
+
+use super::settings::Before;
+
+/// What is wrong with the data.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DataError {
+    /// Columns of different lengths.
+    #[error("{input} samples of the input and {output} of the output; both must be as many")]
+    Lengths {
+        /// Samples of the input.
+        input: usize,
+        /// Samples of the output.
+        output: usize,
+    },
+    /// Hardly any samples.
+    #[error("{found} samples; it needs at least {needed}")]
+    TooFew {
+        /// What was found.
+        found: usize,
+        /// What would do.
+        needed: usize,
+    },
+    /// A sample that is no number.
+    #[error("the {what} is {value} at sample {at}; cut the data there or mend it first")]
+    NotFinite {
+        /// `input`, `output` or `time`.
+        what: &'static str,
+        /// What was found.
+        value: f64,
+        /// First such sample, from 0.
+        at: usize,
+    },
+    /// A time step that is none.
+    #[error("a time step of {dt_s} s; it must be above zero")]
+    Step {
+        /// What was found \[s\].
+        dt_s: f64,
+    },
+    /// Times that do not go on evenly.
+    #[error(
+        "{count} of the time steps differ from the usual {usual_s:.6} s, the first at sample \
+         {first_at} ({first_time_s:.4} s, a step of {first_step_s:.6} s), the largest of \
+         {largest_step_s:.6} s at {largest_time_s:.4} s; resample to even steps or cut the data \
+         at the gaps"
+    )]
+    UnevenSteps {
+        /// How many.
+        count: usize,
+        /// Median step \[s\].
+        usual_s: f64,
+        /// Sample before the first of them, from 0.
+        first_at: usize,
+        /// Its time \[s\].
+        first_time_s: f64,
+        /// The step there \[s\].
+        first_step_s: f64,
+        /// Where the largest step begins \[s\].
+        largest_time_s: f64,
+        /// The largest step \[s\].
+        largest_step_s: f64,
+    },
+    /// An input that never changes.
+    #[error("the input is {value} throughout; a model can be told only from an input that changes")]
+    ConstantInput {
+        /// Its value.
+        value: f64,
+    },
+    /// An input that changes next to nothing.
+    #[error(
+        "the input changes by {range:.3e} at a level of {level:.4}, less than a part in ten \
+         thousand; look at its unit, or excite it more"
+    )]
+    InputHardlyChanges {
+        /// Largest less smallest.
+        range: f64,
+        /// Largest size.
+        level: f64,
+    },
+    /// An output that never changes.
+    #[error("the output is {value} throughout; look whether the sensor was on")]
+    ConstantOutput {
+        /// Its value.
+        value: f64,
+    },
+    /// A signal that was cut off.
+    #[error(
+        "the {what} is cut off: {share_percent:.1} % of its samples stand at its {end}, {value}, \
+         in {runs} runs; a model would take the cut for a part of the machine"
+    )]
+    Clipped {
+        /// `input` or `output`.
+        what: &'static str,
+        /// `largest value` or `smallest value`.
+        end: &'static str,
+        /// That value.
+        value: f64,
+        /// Share of the samples \[%\].
+        share_percent: f64,
+        /// Runs of equal samples there.
+        runs: usize,
+    },
+}
+
+/// Samples of an input and an output at even times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Samples {
+    input: Vec<f64>,
+    output: Vec<f64>,
+    dt_s: f64,
+}
+
+/// A record shorter than this is none.
+const FEWEST: usize = 10;
+/// Part of the usual step by which a step may differ.
+const EVEN: f64 = 0.01;
+/// Change of an input as a part of its level that is noise of the arithmetic.
+const HARDLY: f64 = 1e-4;
+/// Shortest run of equal samples that looks cut off.
+const RUN: usize = 3;
+/// Share of samples in such runs from which on a signal is refused.
+const CUT_SHARE: f64 = 0.02;
+
+impl Samples {
+    /// Of equally long rows, `dt_s` \[s\] apart. Fails where a number is not
+    /// finite or there are fewer than ten.
+    pub fn new(input: Vec<f64>, output: Vec<f64>, dt_s: f64) -> Result<Self, DataError> {
+        if input.len() != output.len() {
+            return Err(DataError::Lengths { input: input.len(), output: output.len() });
+        }
+        finite("input", &input)?;
+        finite("output", &output)?;
+        if !dt_s.is_finite() || dt_s <= 0.0 {
+            return Err(DataError::Step { dt_s });
+        }
+        if input.len() < FEWEST {
+            return Err(DataError::TooFew { found: input.len(), needed: FEWEST });
+        }
+        Ok(Self { input, output, dt_s })
+    }
+
+    /// The same with the times \[s\] of the samples, which must be even to 1 %
+    /// of a step: it does not resample.
+    pub fn at_times(times_s: &[f64], input: Vec<f64>, output: Vec<f64>) -> Result<Self, DataError> {
+        finite("time", times_s)?;
+        if times_s.len() != input.len() {
+            return Err(DataError::Lengths { input: times_s.len(), output: input.len() });
+        }
+        let dt_s = even_step(times_s)?;
+        Self::new(input, output, dt_s)
+    }
+
+    /// The input.
+    pub fn input(&self) -> &[f64] {
+        &self.input
+    }
+
+    /// The output.
+    pub fn output(&self) -> &[f64] {
+        &self.output
+    }
+
+    /// Step \[s\].
+    pub fn dt_s(&self) -> f64 {
+        self.dt_s
+    }
+
+    /// Number of samples, at least ten.
+    #[expect(clippy::len_without_is_empty, reason = "never empty")]
+    pub fn len(&self) -> usize {
+        self.input.len()
+    }
+
+    /// Length of the record \[s\].
+    #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
+    pub fn duration_s(&self) -> f64 {
+        self.len() as f64 * self.dt_s
+    }
+
+    /// Whether the input changes, if only from what came before, and so does the
+    /// output.
+    pub fn check_input(&self, before: Before) -> Result<(), DataError> {
+        let [mut least, mut most] = ends(&self.input);
+        if let Before::Settled { input } = before {
+            (least, most) = (least.min(input), most.max(input));
+        }
+        if least == most {
+            return Err(DataError::ConstantInput { value: least });
+        }
+        let (range, level) = (most - least, most.abs().max(least.abs()));
+        if range < HARDLY * level {
+            return Err(DataError::InputHardlyChanges { range, level });
+        }
+        let [least, most] = ends(&self.output);
+        if least == most { Err(DataError::ConstantOutput { value: least }) } else { Ok(()) }
+    }
+
+    /// Whether input or output stand at an end of their range again and again,
+    /// between samples that differ. Commands that step between levels are not
+    /// taken for cut off, nor an output that has not begun to move or has come
+    /// to rest.
+    pub fn check_clipped(&self) -> Result<(), DataError> {
+        clipped("input", &self.input)?;
+        clipped("output", &self.output)
+    }
+}
+
+fn finite(what: &'static str, row: &[f64]) -> Result<(), DataError> {
+    match row.iter().enumerate().find(|(_, value)| !value.is_finite()) {
+        Some((at, value)) => Err(DataError::NotFinite { what, value: *value, at }),
+        None => Ok(()),
+    }
+}
+
+fn ends(row: &[f64]) -> [f64; 2] {
+    row.iter().fold([f64::MAX, f64::MIN], |[least, most], v| [least.min(*v), most.max(*v)])
+}
+
+/// The mean step of times that go on evenly.
+fn even_step(times_s: &[f64]) -> Result<f64, DataError> {
+    if times_s.len() < FEWEST {
+        return Err(DataError::TooFew { found: times_s.len(), needed: FEWEST });
+    }
+    let steps: Vec<f64> = times_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mut sorted = steps.clone();
+    sorted.sort_by(f64::total_cmp);
+    let usual_s = sorted[sorted.len() / 2];
+    if usual_s <= 0.0 {
+        return Err(DataError::Step { dt_s: usual_s });
+    }
+    let uneven = |step: f64| (step - usual_s).abs() > EVEN * usual_s;
+    let odd: Vec<usize> = (0..steps.len()).filter(|&k| uneven(steps[k])).collect();
+    let largest = (0..steps.len()).max_by(|a, b| steps[*a].total_cmp(&steps[*b])).unwrap_or(0);
+    if let Some(&first_at) = odd.first() {
+        return Err(DataError::UnevenSteps {
+            count: odd.len(),
+            usual_s,
+            first_at,
+            first_time_s: times_s[first_at],
+            first_step_s: steps[first_at],
+            largest_time_s: times_s[largest],
+            largest_step_s: steps[largest],
+        });
+    }
+    #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
+    let mean = (times_s[times_s.len() - 1] - times_s[0]) / steps.len() as f64;
+    Ok(mean)
+}
+
+fn clipped(what: &'static str, row: &[f64]) -> Result<(), DataError> {
+    let runs: Vec<&[f64]> = row.chunk_by(|a, b| a == b).collect();
+    let inner = runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default();
+    let [least, most] = ends(row);
+    let between = || runs.iter().filter(|run| run[0] != least && run[0] != most);
+    let single = between().filter(|run| run.len() == 1).count();
+    // A command that steps between levels holds most of them.
+    if single < FEWEST || 2 * single < between().map(|run| run.len()).sum() {
+        return Ok(());
+    }
+    for (end, value) in [("smallest value", least), ("largest value", most)] {
+        let at_end = inner.iter().filter(|run| run.len() >= RUN && run[0] == value);
+        let (count, samples) = at_end.fold((0, 0), |(n, sum), run| (n + 1, sum + run.len()));
+        #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
+        let share = samples as f64 / row.len() as f64;
+        if share > CUT_SHARE {
+            let share_percent = 100.0 * share;
+            return Err(DataError::Clipped { what, end, value, share_percent, runs: count });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+
+    fn sine(n: u32) -> Vec<f64> {
+        (0..n).map(|k| libm::sin(0.1 * f64::from(k))).collect()
+    }
+
+    #[test]
+    fn gaps_are_told_with_their_place() {
+        let mut times: Vec<f64> = (0..100).map(|k| 0.02 * f64::from(k)).collect();
+        assert!(
+            (Samples::at_times(&times, sine(100), sine(100)).unwrap().dt_s() - 0.02).abs() < 1e-12
+        );
+        for time in times.iter_mut().skip(40) {
+            *time += 0.5;
+        }
+        let words = Samples::at_times(&times, sine(100), sine(100)).unwrap_err().to_string();
+        assert!(words.contains("1 of the time steps") && words.contains("sample 39"), "{words}");
+        assert!(words.contains("0.520000 s at 0.7800 s"), "{words}");
+    }
+
+    #[test]
+    fn what_is_no_record_is_refused() {
+        let mut bad = sine(50);
+        bad[17] = f64::NAN;
+        let error = Samples::new(sine(50), bad, 0.1).unwrap_err();
+        assert!(matches!(error, DataError::NotFinite { what: "output", at: 17, .. }));
+        assert!(matches!(
+            Samples::new(sine(5), sine(5), 0.1),
+            Err(DataError::TooFew { found: 5, needed: 10 })
+        ));
+        assert!(matches!(Samples::new(sine(20), sine(21), 0.1), Err(DataError::Lengths { .. })));
+        assert!(matches!(Samples::new(sine(20), sine(20), 0.0), Err(DataError::Step { .. })));
+    }
+
+    #[test]
+    fn an_input_that_does_not_change_is_refused() {
+        let with = |input: Vec<f64>| {
+            Samples::new(input, sine(50), 0.1).unwrap().check_input(Before::SettledAtFirst)
+        };
+        assert_eq!(with(vec![3.0; 50]), Err(DataError::ConstantInput { value: 3.0 }));
+        let hardly = sine(50).iter().map(|u| 1000.0 + 0.01 * u).collect();
+        assert!(matches!(with(hardly), Err(DataError::InputHardlyChanges { .. })));
+        assert_eq!(with(sine(50)), Ok(()));
+        let still = Samples::new(sine(50), vec![1.0; 50], 0.1).unwrap();
+        assert_eq!(
+            still.check_input(Before::SettledAtFirst),
+            Err(DataError::ConstantOutput { value: 1.0 })
+        );
+    }
+
+    #[test]
+    fn a_signal_cut_off_is_told_from_a_command_that_steps() {
+        let cut: Vec<f64> = sine(600).iter().map(|y| y.min(0.8)).collect();
+        let clipped = Samples::new(sine(600), cut.clone(), 0.1).unwrap().check_clipped();
+        assert!(matches!(
+            clipped,
+            Err(DataError::Clipped { what: "output", end: "largest value", value: 0.8, .. })
+        ));
+        let clipped = Samples::new(cut, sine(600), 0.1).unwrap().check_clipped();
+        assert!(matches!(clipped, Err(DataError::Clipped { what: "input", .. })));
+        let steps: Vec<f64> = (0..600_u32).map(|k| f64::from((k / 20 * 7) % 2)).collect();
+        assert_eq!(Samples::new(steps, sine(600), 0.1).unwrap().check_clipped(), Ok(()));
+        // Dead time before, rest after.
+        let mut answer = vec![0.0; 60];
+        answer.extend((0..240).map(|k| 1.0 - libm::exp(-0.05 * f64::from(k))));
+        answer.extend([1.0; 100]);
+        assert_eq!(Samples::new(sine(400), answer, 0.1).unwrap().check_clipped(), Ok(()));
+    }
+}

@@ -1,0 +1,166 @@
+//! What is fitted.
+
+use super::MOST_POLES;
+use super::error::FitError;
+use super::samples::Samples;
+use crate::model::Between;
+
+/// Form of the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Structure {
+    /// K·(Tz·s + 1)/(T·s + 1)·e^(−Ls). Parameters `gain`, `time_constant_s`, `zero_s`.
+    FirstOrder {
+        /// With Tz; without, it is 0.
+        zero: bool,
+    },
+    /// K·(Tz·s + 1)/((T1·s + 1)(T2·s + 1))·e^(−Ls). Parameters `gain`,
+    /// `time_constant_1_s` (the longer), `time_constant_2_s`, `zero_s`.
+    SecondOrderReal {
+        /// With Tz; without, it is 0.
+        zero: bool,
+    },
+    /// K·(Tz·s + 1)/(T²·s² + 2ζT·s + 1)·e^(−Ls). Parameters `gain`, `period_s`
+    /// (one over the natural frequency), `damping`, `zero_s`.
+    SecondOrderOscillating {
+        /// With Tz; without, it is 0.
+        zero: bool,
+    },
+    /// b(s)/a(s)·e^(−Ls), 1 to 4 poles, the denominator with a leading 1.
+    /// Parameters `b0`…, `a0`… with the power of s that they stand before.
+    Transfer {
+        /// Number of poles.
+        poles: usize,
+        /// Number of zeros, at most that of the poles.
+        zeros: usize,
+    },
+}
+
+impl Structure {
+    /// Number of poles.
+    pub fn poles(self) -> usize {
+        match self {
+            Self::FirstOrder { .. } => 1,
+            Self::SecondOrderReal { .. } | Self::SecondOrderOscillating { .. } => 2,
+            Self::Transfer { poles, .. } => poles,
+        }
+    }
+
+    /// Number of zeros.
+    pub fn zeros(self) -> usize {
+        match self {
+            Self::FirstOrder { zero }
+            | Self::SecondOrderReal { zero }
+            | Self::SecondOrderOscillating { zero } => usize::from(zero),
+            Self::Transfer { zeros, .. } => zeros,
+        }
+    }
+}
+
+/// Dead time of the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DeadTime {
+    /// Known \[s\]; 0 for none.
+    Given(f64),
+    /// Estimated within a range, to a part of a step.
+    Estimated {
+        /// Lower end \[s\].
+        least_s: f64,
+        /// Upper end \[s\].
+        most_s: f64,
+    },
+}
+
+/// The output for an input that stands at the input level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Level {
+    /// Known, in units of the output. A level that is truly known sharpens the
+    /// gain a lot where the input is a single step.
+    Known(f64),
+    /// A parameter of the fit, `output_level`.
+    Estimated,
+}
+
+/// What came before the first sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Before {
+    /// The input had stood at this level for long and the output was at rest.
+    Settled {
+        /// Input level, in units of the input.
+        input: f64,
+    },
+    /// The same with the level of the first sample.
+    SettledAtFirst,
+    /// Nothing is known: the input is taken to have stood at the first sample's
+    /// level for the dead time, and what the output still does by itself – one
+    /// number for each pole – is estimated, too.
+    Unknown,
+}
+
+/// What is fitted, and how the data are to be read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Form of the model.
+    pub structure: Structure,
+    /// Its dead time.
+    pub dead_time: DeadTime,
+    /// What the input does between samples: held for commands, linear for
+    /// measured quantities.
+    pub between: Between,
+    /// The output at the operating point.
+    pub level: Level,
+    /// What came before the first sample.
+    pub before: Before,
+    /// Whether a model with parameters that the data do not determine is given
+    /// all the same, with [`super::Note::Undetermined`].
+    pub accept_undetermined: bool,
+}
+
+impl Settings {
+    /// A structure with a dead time, a held input, an estimated output level,
+    /// settled at the first sample.
+    pub fn new(structure: Structure, dead_time: DeadTime) -> Self {
+        Self {
+            structure,
+            dead_time,
+            between: Between::Held,
+            level: Level::Estimated,
+            before: Before::SettledAtFirst,
+            accept_undetermined: false,
+        }
+    }
+
+    /// Number of parameters that are estimated.
+    pub fn parameters(&self) -> usize {
+        let poles = self.structure.poles();
+        let dead_time = usize::from(matches!(self.dead_time, DeadTime::Estimated { .. }));
+        let level = usize::from(self.level == Level::Estimated);
+        let free = if self.before == Before::Unknown { poles } else { 0 };
+        self.structure.zeros() + 1 + poles + dead_time + level + free
+    }
+
+    pub(super) fn check(&self, samples: &Samples) -> Result<(), FitError> {
+        let (poles, zeros) = (self.structure.poles(), self.structure.zeros());
+        if poles == 0 || poles > MOST_POLES || zeros > poles {
+            return Err(FitError::Order { poles, zeros });
+        }
+        let (least_s, most_s) = match self.dead_time {
+            DeadTime::Given(given) => (given, given),
+            DeadTime::Estimated { least_s, most_s } => (least_s, most_s),
+        };
+        let most_allowed_s = 0.5 * samples.duration_s();
+        let possible = least_s >= 0.0 && most_s >= least_s && most_s <= most_allowed_s;
+        let estimated = matches!(self.dead_time, DeadTime::Estimated { .. });
+        if !possible || (estimated && most_s == least_s) {
+            return Err(FitError::DeadTimeRange { least_s, most_s, most_allowed_s });
+        }
+        let (found, parameters) = (samples.len(), self.parameters());
+        let needed = SAMPLES_A_PARAMETER * parameters;
+        if found < needed {
+            return Err(FitError::TooFewForParameters { found, parameters, needed });
+        }
+        Ok(())
+    }
+}
+
+/// Fewer samples for each parameter say nothing about the noise.
+const SAMPLES_A_PARAMETER: usize = 5;

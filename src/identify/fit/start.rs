@@ -1,0 +1,187 @@
+//! Where the descent starts: least squares behind a state-variable filter at
+//! several bandwidths and dead times, and models of one pole fewer.
+
+use nalgebra::Complex;
+
+use super::error::FitError;
+use super::levenberg::{Outcome, descend, fill_linear, nearest};
+use super::problem::Problem;
+use super::settings::{DeadTime, Level};
+use crate::model::{Between, Simulator, TransferFunction, polynomial};
+
+/// Bandwidths of the filter, evenly spread in their logarithm.
+const BANDWIDTHS: u32 = 5;
+/// Dead times that are tried at the most.
+const MOST_DEAD_TIMES: usize = 25;
+/// Starts that are followed a few steps, and to the end.
+const FOLLOWED: usize = 5;
+const TO_THE_END: usize = 2;
+const FEW_STEPS: usize = 8;
+const MANY_STEPS: usize = 200;
+
+/// The best model that any of the starts leads to.
+pub(super) fn best(problem: &Problem) -> Result<Outcome, FitError> {
+    let mut starts = candidates(problem);
+    starts.sort_by(|a, b| a.squares.total_cmp(&b.squares));
+    starts.dedup_by(|b, a| (b.squares - a.squares).abs() < 1e-6 * a.squares);
+    starts.truncate(FOLLOWED);
+    if problem.poles > 2 {
+        starts.extend(from_fewer_poles(problem));
+    }
+    let mut followed: Vec<Outcome> =
+        starts.iter().filter_map(|start| descend(problem, &start.theta, FEW_STEPS)).collect();
+    followed.sort_by(|a, b| a.squares.total_cmp(&b.squares));
+    followed.truncate(TO_THE_END);
+    let ends = followed.iter().filter_map(|start| descend(problem, &start.theta, MANY_STEPS));
+    ends.min_by(|a, b| a.squares.total_cmp(&b.squares)).ok_or(FitError::NoStart)
+}
+
+/// The best model with a pole fewer and another that is hardly seen: a model
+/// with more poles is then never worse.
+fn from_fewer_poles(problem: &Problem) -> Vec<Outcome> {
+    let poles = problem.poles - 1;
+    let fewer = Problem { poles, zeros: problem.zeros.min(poles), ..problem.clone() };
+    let Ok(best) = best(&fewer) else { return Vec::new() };
+    let slow: f64 = best.theta[fewer.zeros + 1];
+    let with_pole = |time_s: f64| {
+        let den = polynomial::multiply(&fewer.den(&best.theta), &[time_s, 1.0]);
+        started(problem, &den, fewer.dead_time_s(&best.theta))
+    };
+    [0.1 * problem.dt_s, problem.dt_s, 0.2 * slow].into_iter().filter_map(with_pole).collect()
+}
+
+/// A start of a denominator (highest power first, of any scale) and a dead
+/// time, with the numerator that fits best.
+fn started(problem: &Problem, den: &[f64], dead_time_s: f64) -> Option<Outcome> {
+    let layout = problem.layout();
+    let mut theta = vec![0.0; layout.total];
+    let last = den.last().copied()?;
+    for (i, c) in den.iter().rev().skip(1).enumerate() {
+        theta[layout.poles_from + i] = c / last;
+    }
+    if let Some(place) = layout.dead_time {
+        theta[place] = dead_time_s;
+    }
+    problem.project(&mut theta);
+    let squares = fill_linear(problem, &mut theta)?;
+    Some(Outcome { theta, squares })
+}
+
+fn candidates(problem: &Problem) -> Vec<Outcome> {
+    let dead_times = dead_times(problem);
+    let slowest = 4.0 / problem.duration_s();
+    let ratio = libm::log(0.5 / problem.dt_s / slowest) / f64::from(BANDWIDTHS - 1);
+    let mut found = Vec::new();
+    for k in 0..BANDWIDTHS {
+        let bandwidth = slowest * libm::exp(ratio * f64::from(k));
+        let Some(filtered) = Filtered::of(problem, bandwidth) else { continue };
+        for &dead_time_s in &dead_times {
+            let den = filtered.denominator(problem, dead_time_s);
+            found.extend(den.and_then(|den| started(problem, &den, dead_time_s)));
+        }
+    }
+    found
+}
+
+/// Whole steps where the range is narrow, spread over it where it is wide.
+fn dead_times(problem: &Problem) -> Vec<f64> {
+    let DeadTime::Estimated { least_s, most_s } = problem.dead_time else {
+        return vec![problem.dead_time_s(&[])];
+    };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
+    let steps = ((most_s - least_s) / problem.dt_s).ceil() as usize;
+    let count = steps.clamp(1, MOST_DEAD_TIMES - 1);
+    #[expect(clippy::cast_precision_loss, reason = "at most 25")]
+    let at = |k: usize| least_s + (most_s - least_s) * k as f64 / count as f64;
+    (0..=count).map(at).collect()
+}
+
+/// Input, output and a constant behind s^j/(s + λ)^n.
+struct Filtered {
+    /// j from 0 to the number of zeros.
+    input: Vec<Vec<f64>>,
+    /// j from 0 to the number of poles.
+    output: Vec<Vec<f64>>,
+    /// j from 0 to one below the number of poles; none where the level is known
+    /// and the record begins at rest.
+    constant: Vec<Vec<f64>>,
+}
+
+impl Filtered {
+    fn of(problem: &Problem, bandwidth: f64) -> Option<Self> {
+        let n = problem.poles;
+        let den = (0..n).fold(vec![1.0], |p, _| polynomial::multiply(&p, &[1.0, bandwidth]));
+        let through = |row: &[f64], j: usize, between: Between| -> Option<Vec<f64>> {
+            let mut num = vec![0.0; j + 1];
+            num[0] = libm::pow(bandwidth, f64::from(u32::try_from(n - j).ok()?));
+            let tf = TransferFunction::new(&num, &den, 0.0).ok()?;
+            let mut model = Simulator::new(&tf, problem.dt_s, between).ok()?;
+            Some(row.iter().map(|u| model.step(*u)).collect())
+        };
+        let level = match problem.level {
+            Level::Known(level) => level,
+            Level::Estimated => problem.output.first().copied()?,
+        };
+        let output: Vec<f64> = problem.output.iter().map(|y| y - level).collect();
+        let unsettled = problem.free || problem.level == Level::Estimated;
+        let ones = vec![1.0; output.len()];
+        let constants = if unsettled { n } else { 0 };
+        Some(
+            Self {
+                input: (0..=problem.zeros)
+                    .map(|j| through(&problem.input, j, problem.between))
+                    .collect::<Option<_>>()?,
+                output: (0..=n)
+                    .map(|j| through(&output, j, Between::Linear))
+                    .collect::<Option<_>>()?,
+                constant: (0..constants)
+                    .map(|j| through(&ones, j, Between::Held))
+                    .collect::<Option<_>>()?,
+            }
+            .unscaled(bandwidth, n),
+        )
+    }
+
+    /// The filter was run with a gain of about one; back to s^j/(s + λ)^n.
+    fn unscaled(mut self, bandwidth: f64, n: usize) -> Self {
+        let power = |j: usize| (j..n).fold(1.0, |p, _| p * bandwidth);
+        for rows in [&mut self.input, &mut self.output, &mut self.constant] {
+            for (j, row) in rows.iter_mut().enumerate() {
+                let factor = 1.0 / power(j);
+                for value in row.iter_mut() {
+                    *value *= factor;
+                }
+            }
+        }
+        self
+    }
+
+    /// A stable denominator: s^n·y = −Σ a(j)·s^j·y + Σ b(j)·s^j·u(t − L), solved for a.
+    fn denominator(&self, problem: &Problem, dead_time_s: f64) -> Option<Vec<f64>> {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
+        let delay = (dead_time_s / problem.dt_s).round() as usize;
+        let late = |row: &Vec<f64>| -> Vec<f64> {
+            let zeros = std::iter::repeat_n(0.0, delay.min(row.len()));
+            zeros.chain(row.iter().copied()).take(row.len()).collect()
+        };
+        let n = problem.poles;
+        let mut columns: Vec<Vec<f64>> = self.output[..n].to_vec();
+        columns.extend(self.input.iter().map(late));
+        columns.extend(self.constant.iter().cloned());
+        let found = nearest(&columns, &self.output[n])?;
+        let monic: Vec<f64> =
+            [1.0].into_iter().chain(found[..n].iter().rev().map(|a| -a)).collect();
+        Some(stable(&monic, problem))
+    }
+}
+
+/// The same with poles that lie on the right mirrored, and none slower than the
+/// record or faster than a tenth of a step.
+fn stable(monic: &[f64], problem: &Problem) -> Vec<f64> {
+    let (least, most) = (1.0 / problem.duration_s(), 10.0 / problem.dt_s);
+    let mend = |pole: &Complex<f64>| {
+        Complex::new(-pole.re.abs().clamp(least, most), pole.im.clamp(-most, most))
+    };
+    let poles: Vec<Complex<f64>> = polynomial::roots(monic).iter().map(mend).collect();
+    polynomial::from_roots(&poles)
+}
