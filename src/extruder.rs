@@ -10,19 +10,18 @@
 
 pub mod adaptive;
 pub mod demand;
+pub mod drive;
 pub mod law;
 pub mod limits;
-pub mod profile;
-pub mod quantity;
 pub mod rates;
 pub mod report;
 pub mod state;
 pub mod supervisor;
 
 pub use demand::{FlowDemand, Follows};
+pub use drive::Drive;
 pub use law::Law;
 pub use limits::{CommandLimit, CommandLimits};
-pub use quantity::Quantity;
 pub use report::{ExtruderCommand, ExtruderReport, PumpMode};
 pub use state::{ExtruderFault, ExtruderHold, ExtruderState, ExtruderTrace};
 pub use supervisor::{ExtruderSetup, Laying, Supervisor};

@@ -5,7 +5,6 @@ pub mod camera;
 pub mod clock;
 pub mod foxglove;
 pub mod image_file;
-pub mod profile_file;
 pub mod record;
 pub mod recording;
 pub mod robot;

@@ -96,12 +96,19 @@ fn a_profile_is_played_and_a_bad_one_has_its_line() {
         "strategy = \"profile\"\nprofile = \"steps.csv\"",
     );
     fs::write(folder.path().join("cell.toml"), text).unwrap();
-    fs::write(folder.path().join("steps.csv"), "time_s,screw_rpm\n0,60\n5,70\n9,55\n").unwrap();
+    fs::write(folder.path().join("steps.csv"), "time_s,screw_rpm\n0,60\n5,70\n9,55\n30,55\n")
+        .unwrap();
     let output = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out"]);
     assert_eq!(output.status.code(), Some(0), "{output:?}");
-    fs::write(folder.path().join("steps.csv"), "time_s,screw_rpm\n0,60\n5,fast\n").unwrap();
-    let output = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out2"]);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_ne!(output.status.code(), Some(0));
-    assert!(said.contains("line 3") && said.contains("`fast`"), "{said}");
+    for (profile, told) in [
+        ("time_s,screw_rpm\n0,60\n5,fast\n9,60\n", "line 3"),
+        ("time_s,drive_v\n0,60\n5,60\n", "expected a quantity in rpm"),
+        ("time_s,screw_rpm\n0,60\n5,600\n9,600\n", "expected 0 to 90"),
+    ] {
+        fs::write(folder.path().join("steps.csv"), profile).unwrap();
+        let output = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out2"]);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("steps.csv") && said.contains(told), "{said}");
+    }
 }

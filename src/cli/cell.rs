@@ -8,10 +8,12 @@ use anyhow::Context;
 use super::WrongArguments;
 use crate::calib::{Calibration, SurfaceMap};
 use crate::config::Cell;
-use crate::config::cell::{CalibrationSource, Purpose};
+use crate::config::cell::{CalibrationSource, ExtruderPart, Purpose};
 use crate::config::extruder::Strategy;
 use crate::extruder::Law;
-use crate::io::{calibration_file, profile_file};
+use crate::extruder::law::{Constant, Played};
+use crate::identify::profile;
+use crate::io::calibration_file;
 use crate::sim::cell::Rig;
 use crate::sim::extruder::SimExtruder;
 use crate::units::Mm;
@@ -73,8 +75,8 @@ impl LoadedCell {
             .into());
         };
         let law = match &part.extruder.strategy {
-            Strategy::Constant { value } => Law::Constant(*value),
-            Strategy::Profile { file } => Law::Profile(profile_file::read(file)?),
+            Strategy::Constant { value } => Law::Constant(Constant(*value)),
+            Strategy::Profile { file } => Law::Profile(read_profile(file, part)?),
         };
         Ok(Some(Rig {
             setup: part.extruder.setup(law),
@@ -106,4 +108,29 @@ impl LoadedCell {
             }
         }
     }
+}
+
+/// A profile of commands; one of another quantity, or beyond the limits, is
+/// refused before anything moves.
+fn read_profile(file: &Path, part: &ExtruderPart) -> anyhow::Result<Played> {
+    let wrong = |what: String| WrongArguments::new(format!("profile {}: {what}", file.display()));
+    let text = fs::read_to_string(file).map_err(|error| wrong(error.to_string()))?;
+    let (profile, quantity) =
+        profile::file::parse(&text).map_err(|error| wrong(error.to_string()))?;
+    let unit = part.extruder.drive.unit();
+    if quantity.unit != unit {
+        return Err(wrong(format!(
+            "found {quantity}, expected a quantity in {unit}, the command of [extruder]"
+        ))
+        .into());
+    }
+    let ((low, high), (min, max)) = (profile.range(), part.extruder.limits.range());
+    if low < min || high > max {
+        return Err(wrong(format!(
+            "found commands from {low} to {high} {unit}, expected {min} to {max}, the limits \
+             of [extruder]"
+        ))
+        .into());
+    }
+    Ok(Played::new(profile))
 }

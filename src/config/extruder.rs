@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::table::Table;
 use crate::extruder::demand::section;
-use crate::extruder::{CommandLimits, ExtruderSetup, FlowDemand, Follows, Law, Quantity};
+use crate::extruder::{CommandLimits, Drive, ExtruderSetup, FlowDemand, Follows, Law};
 use crate::time::Span;
 use crate::units::{MPa, Mm, MmPerS};
 
@@ -17,7 +17,7 @@ const ANY: std::ops::RangeInclusive<f64> = -1e9..=1e9;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extruder {
     /// What is commanded.
-    pub quantity: Quantity,
+    pub drive: Drive,
     /// What commands may be.
     pub limits: CommandLimits,
     /// How commands are found.
@@ -76,7 +76,7 @@ struct Keys {
     rate: &'static str,
 }
 
-const fn keys(quantity: Quantity) -> Keys {
+const fn keys(drive: Drive) -> Keys {
     macro_rules! keys {
         ($unit:literal) => {
             Keys {
@@ -87,25 +87,25 @@ const fn keys(quantity: Quantity) -> Keys {
             }
         };
     }
-    match quantity {
-        Quantity::Rpm => keys!("rpm"),
-        Quantity::Volts => keys!("v"),
-        Quantity::Pressure => keys!("mpa"),
-        Quantity::Flow => keys!("mm3_per_s"),
-        Quantity::MassFlow => keys!("kg_per_s"),
-        Quantity::Filling => keys!("filling"),
+    match drive {
+        Drive::Rpm => keys!("rpm"),
+        Drive::Volts => keys!("v"),
+        Drive::Pressure => keys!("mpa"),
+        Drive::Flow => keys!("mm3_per_s"),
+        Drive::MassFlow => keys!("kg_per_s"),
+        Drive::Filling => keys!("filling"),
     }
 }
 
 impl Extruder {
     /// Reads `[extruder]`.
     pub fn read(table: &Table<'_>, folder: &Path) -> Option<Self> {
-        let quantity = table.required_choice("command", &Quantity::WORDS);
-        if quantity.is_none() {
+        let drive = table.required_choice("command", &Drive::WORDS);
+        if drive.is_none() {
             table.pass_over();
         }
-        let limits = quantity.and_then(|quantity| read_limits(table, quantity));
-        let strategy = quantity.and_then(|quantity| read_strategy(table, folder, quantity, limits));
+        let limits = drive.and_then(|drive| read_limits(table, drive));
+        let strategy = drive.and_then(|drive| read_strategy(table, folder, drive, limits));
         let height = table.number("layer_height_mm", 1e-3..=1e4);
         let follows = table
             .choice("follows", &[("robot", Follows::Robot), ("start_speed", Follows::StartSpeed)]);
@@ -114,7 +114,7 @@ impl Extruder {
         let max_hold = table.number("max_hold_s", 0.1..=3600.0);
         let max_pressure = table.optional_number("max_pressure_mpa", 1e-6..=1e4);
         Some(Self {
-            quantity: quantity?,
+            drive: drive?,
             limits: limits?,
             strategy: strategy?,
             layer_height: Mm::new(height?).ok()?,
@@ -143,7 +143,7 @@ impl Extruder {
     pub fn setup(&self, law: Law) -> ExtruderSetup {
         let period = |hz: f64| Span::from_secs(1.0 / hz);
         ExtruderSetup {
-            quantity: self.quantity,
+            drive: self.drive,
             law,
             limits: self.limits,
             feedforward_period: period(self.rates.feedforward_hz),
@@ -156,8 +156,8 @@ impl Extruder {
     }
 }
 
-fn read_limits(table: &Table<'_>, quantity: Quantity) -> Option<CommandLimits> {
-    let keys = keys(quantity);
+fn read_limits(table: &Table<'_>, drive: Drive) -> Option<CommandLimits> {
+    let keys = keys(drive);
     let min = table.number(keys.min, ANY);
     let max = table.number(keys.max, ANY);
     let rate = table.number(keys.rate, 1e-9..=1e12);
@@ -172,7 +172,7 @@ fn read_limits(table: &Table<'_>, quantity: Quantity) -> Option<CommandLimits> {
 fn read_strategy(
     table: &Table<'_>,
     folder: &Path,
-    quantity: Quantity,
+    drive: Drive,
     limits: Option<CommandLimits>,
 ) -> Option<Strategy> {
     let words = [("constant", Word::Constant), ("profile", Word::Profile)];
@@ -182,7 +182,7 @@ fn read_strategy(
     }
     match word? {
         Word::Constant => {
-            let key = keys(quantity).value;
+            let key = keys(drive).value;
             let (low, high) = limits.map_or((f64::MIN, f64::MAX), |limits| limits.range());
             table.number(key, low..=high).map(|value| Strategy::Constant { value })
         }

@@ -1,9 +1,14 @@
 //! The strategies of the extruder side behind one face: what is wanted of the
 //! nozzle and what the extruder reports go in, a command comes out.
 
-use super::profile::Profile;
+mod adaptive;
+mod played;
+
+pub use adaptive::{AdaptiveNozzle, NozzleModel};
+pub use played::{Constant, Played};
+
 use super::report::ExtruderReport;
-use crate::time::Span;
+use crate::time::{Span, Stamp};
 use crate::units::Mm3PerS;
 
 /// A reading that a law cannot do without.
@@ -26,24 +31,6 @@ impl Need {
             Self::Flow => report.flow_mm3_per_s.is_some(),
         }
     }
-
-    /// What the operator is told is missing.
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::Pressure => "pressure",
-            Self::Filled => "filled length",
-            Self::Flow => "flow",
-        }
-    }
-}
-
-/// A strategy with its memory.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Law {
-    /// One command for as long as bead is laid.
-    Constant(f64),
-    /// Commands that were written down beforehand, for an experiment.
-    Profile(Profile),
 }
 
 /// A command with the parts that it is made of, in the unit of the command.
@@ -58,55 +45,66 @@ pub struct Wish {
 }
 
 impl Wish {
-    const fn known(value: f64) -> Self {
+    /// A command that answers nothing.
+    pub const fn known(value: f64) -> Self {
         Self { value, feedforward: value, feedback: 0.0 }
     }
 }
 
-impl Law {
+/// What every law can do. None of it allocates.
+pub trait Strategy {
     /// The readings that it needs.
-    pub const fn needs(&self) -> &'static [Need] {
-        match self {
-            Self::Constant(_) | Self::Profile(_) => &[],
-        }
+    fn needs(&self) -> &'static [Need] {
+        &[]
     }
 
     /// Begins a bead at a wanted flow, in the steady state that belongs to it.
-    pub fn begin(&mut self, _flow: Mm3PerS) -> Wish {
-        match self {
-            Self::Constant(value) => Wish::known(*value),
-            Self::Profile(profile) => {
-                profile.begin();
-                Wish::known(profile.value())
-            }
-        }
-    }
+    fn begin(&mut self, now: Stamp, flow: Mm3PerS) -> Wish;
 
-    /// The part that runs at the rate of the feedforward.
-    pub fn foresee(&mut self, dt: Span, _flow: Mm3PerS) {
-        match self {
-            Self::Constant(_) => {}
-            Self::Profile(profile) => profile.advance(dt),
-        }
-    }
+    /// The part that runs at the rate of the feedforward, `dt` after the last
+    /// time.
+    fn foresee(&mut self, dt: Span, flow: Mm3PerS);
 
-    /// The part that runs at the rate of the control. The report is not older
-    /// than the supervisor allows and has what [`Self::needs`] names.
-    pub fn answer(&mut self, _dt: Span, _report: Option<&ExtruderReport>) {
-        match self {
-            Self::Constant(_) | Self::Profile(_) => {}
-        }
-    }
+    /// The part that runs at the rate of the control, `dt` after the last time
+    /// (zero at the first). The report is not older than the supervisor allows
+    /// and has what [`Self::needs`] names.
+    fn answer(&mut self, now: Stamp, dt: Span, report: &ExtruderReport);
 
     /// What it would like now.
-    pub fn wish(&self) -> Wish {
+    fn wish(&self) -> Wish;
+
+    /// Learns what became of its wish, so that nothing winds up against a
+    /// limit, and that a law which was held goes on from what was applied.
+    fn settle(&mut self, now: Stamp, applied: f64);
+}
+
+/// A strategy with its memory.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Law {
+    /// One command for as long as bead is laid.
+    Constant(Constant),
+    /// Commands that were written down beforehand, for an experiment.
+    Profile(Played),
+    /// Model-reference adaptive control of the speed in the nozzle.
+    Adaptive(AdaptiveNozzle),
+}
+
+impl Law {
+    /// The law behind the name.
+    pub fn strategy(&self) -> &dyn Strategy {
         match self {
-            Self::Constant(value) => Wish::known(*value),
-            Self::Profile(profile) => Wish::known(profile.value()),
+            Self::Constant(law) => law,
+            Self::Profile(law) => law,
+            Self::Adaptive(law) => law,
         }
     }
 
-    /// Learns what became of its wish, so that nothing winds up against a
-    /// limit.
-    pub fn settle(&mut self, _applied: f64) {}
+    /// The same, to be stepped.
+    pub fn strategy_mut(&mut self) -> &mut dyn Strategy {
+        match self {
+            Self::Constant(law) => law,
+            Self::Profile(law) => law,
+            Self::Adaptive(law) => law,
+        }
+    }
 }

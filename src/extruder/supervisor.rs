@@ -10,7 +10,7 @@
 //!   goes, and a fault when it stays too long.
 //! - fault: the pump is stopped; left when the robot is idle again.
 
-use super::Quantity;
+use super::Drive;
 use super::law::{Law, Wish};
 use super::limits::{CommandLimit, CommandLimits};
 use super::rates::Rate;
@@ -24,7 +24,7 @@ use crate::units::{MPa, Mm3PerS};
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtruderSetup {
     /// What is commanded.
-    pub quantity: Quantity,
+    pub drive: Drive,
     /// The strategy.
     pub law: Law,
     /// What commands may be.
@@ -207,7 +207,7 @@ impl Supervisor {
     /// command of a bead is no change of another and has no rate.
     fn begin(&mut self, now: Stamp, flow: Mm3PerS) {
         self.phase = Phase::Starting { since: now };
-        let wish = self.setup.law.begin(flow);
+        let wish = self.setup.law.strategy_mut().begin(now, flow);
         let (low, high) = self.setup.limits.range();
         self.applied = if wish.value.is_finite() {
             wish.value.clamp(low, high)
@@ -215,21 +215,23 @@ impl Supervisor {
             self.setup.limits.idle()
         };
         self.note(wish, CommandLimit::None);
-        self.setup.law.settle(self.applied);
+        self.setup.law.strategy_mut().settle(now, self.applied);
     }
 
     fn drive(&mut self, now: Stamp, dt: Span, flow: Mm3PerS) {
-        self.setup.law.foresee(dt, flow);
-        if self.control.due(now) {
+        let law = self.setup.law.strategy_mut();
+        law.foresee(dt, flow);
+        if self.control.due(now)
+            && let Some((_, report)) = &self.report
+        {
             let since = self.controlled.replace(now).map_or(Span::ZERO, |last| now - last);
-            let report = self.report.map(|(_, report)| report);
-            self.setup.law.answer(since, report.as_ref());
+            law.answer(now, since, report);
         }
-        let wish = self.setup.law.wish();
+        let wish = law.wish();
         let (applied, limit) = self.setup.limits.apply(wish.value, self.applied, dt);
+        law.settle(now, applied);
         self.applied = applied;
         self.note(wish, limit);
-        self.setup.law.settle(applied);
     }
 
     fn note(&mut self, wish: Wish, limit: CommandLimit) {
@@ -244,7 +246,7 @@ impl Supervisor {
             self.phase = Phase::Running;
             self.controlled = None;
         }
-        if self.setup.quantity == Quantity::Rpm
+        if self.setup.drive == Drive::Rpm
             && let Some(turning) = report.screw_rpm
         {
             match self.follow.observe_share(now, turning.get(), self.applied) {
@@ -260,7 +262,7 @@ impl Supervisor {
     }
 
     fn has_what_is_needed(&self, report: &ExtruderReport) -> bool {
-        self.setup.law.needs().iter().all(|need| need.met_by(report))
+        self.setup.law.strategy().needs().iter().all(|need| need.met_by(report))
     }
 
     /// Holds when reports stay out, and gives up when a hold or a start lasts

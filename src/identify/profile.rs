@@ -1,5 +1,7 @@
 //! A command over time, as stairs: each value holds until the next one.
 
+pub mod file;
+
 /// A value that holds from a moment on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {

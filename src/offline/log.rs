@@ -13,7 +13,7 @@ use super::widths::WidthsWriter;
 use crate::config::cell::RunPart;
 use crate::control::limiter::Limits;
 use crate::control::{Event, Step};
-use crate::extruder::Quantity;
+use crate::extruder::Drive;
 use crate::frame::Frame;
 use crate::time::Stamp;
 use crate::units::{Mm, Mm3PerS};
@@ -47,13 +47,13 @@ pub struct ControlFacts {
     /// What setpoints may be.
     pub limits: Limits,
     /// What the extruder is told, where it is commanded.
-    pub extruder: Option<Quantity>,
+    pub extruder: Option<Drive>,
 }
 
 impl ControlFacts {
     /// Of a cell's run.
     pub fn of(run: &RunPart) -> Self {
-        let extruder = run.extruder.as_ref().map(|part| part.extruder.quantity);
+        let extruder = run.extruder.as_ref().map(|part| part.extruder.drive);
         Self { limits: run.limits, extruder }
     }
 }

@@ -22,7 +22,7 @@ use super::picker::Chosen;
 use super::stats::Distribution;
 use super::summary::Summary;
 use crate::control::limiter::Limits;
-use crate::extruder::Quantity;
+use crate::extruder::Drive;
 
 /// Everything that a page is made of.
 #[derive(Debug)]
@@ -40,7 +40,7 @@ pub struct Report<'a> {
     /// What setpoints may be; none without a controller.
     pub limits: Option<Limits>,
     /// What the extruder is told; none where it goes its own way.
-    pub extruder: Option<Quantity>,
+    pub extruder: Option<Drive>,
     /// Latencies \[ms\]; none without a controller.
     pub latencies: Option<&'a Distribution>,
     /// Frames with their edges.
@@ -65,7 +65,7 @@ impl Report<'_> {
             (headline::tiles(self.summary))
             (sections::over_time(self))
             (sections::over_path(self))
-            @if let Some(quantity) = self.extruder { (self.charts.extruder.section(quantity)) }
+            @if let Some(drive) = self.extruder { (self.charts.extruder.section(drive)) }
             (sections::rejections(self))
             (sections::pictures(self))
             (sections::hints(self))

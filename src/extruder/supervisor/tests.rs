@@ -1,5 +1,6 @@
 use super::*;
-use crate::extruder::profile::Profile;
+use crate::extruder::law::{Constant, Played};
+use crate::identify::profile::{Point, Profile};
 use crate::units::Rpm;
 
 const TICK: Span = Span::from_millis(5);
@@ -7,7 +8,7 @@ const FLOW: Mm3PerS = Mm3PerS::constant(500.0);
 
 fn setup(law: Law) -> ExtruderSetup {
     ExtruderSetup {
-        quantity: Quantity::Rpm,
+        drive: Drive::Rpm,
         law,
         limits: CommandLimits::new(0.0, 60.0, 40.0).unwrap(),
         feedforward_period: TICK,
@@ -72,7 +73,7 @@ impl Bench {
 
 #[test]
 fn commands_go_out_at_the_rate_of_the_link_while_bead_is_laid() {
-    let mut bench = Bench::new(Law::Constant(30.0));
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
     assert_eq!(bench.go(1.0), ExtruderState::Running);
     assert_eq!(bench.sent.len(), 50);
     let on = ExtruderCommand { pump_on: true, valve_open: true, value: 30.0 };
@@ -84,12 +85,12 @@ fn commands_go_out_at_the_rate_of_the_link_while_bead_is_laid() {
 
 #[test]
 fn a_pump_that_does_not_start_is_a_fault_and_one_that_does_is_waited_for() {
-    let mut bench = Bench::new(Law::Constant(30.0));
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
     bench.report = Some(report(PumpMode::Starting, 0.0));
     assert_eq!(bench.go(0.6), ExtruderState::Starting);
     bench.report = Some(report(PumpMode::On, 30.0));
     assert_eq!(bench.go(0.1), ExtruderState::Running);
-    let mut stuck = Bench::new(Law::Constant(30.0));
+    let mut stuck = Bench::new(Law::Constant(Constant(30.0)));
     stuck.report = Some(report(PumpMode::Starting, 0.0));
     assert_eq!(stuck.go(1.1), ExtruderState::Fault(ExtruderFault::DidNotStart));
     assert!(!stuck.last().pump_on);
@@ -97,7 +98,7 @@ fn a_pump_that_does_not_start_is_a_fault_and_one_that_does_is_waited_for() {
 
 #[test]
 fn reports_that_stay_out_are_a_hold_then_a_fault() {
-    let mut bench = Bench::new(Law::Constant(30.0));
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
     bench.go(0.5);
     bench.report = None;
     assert_eq!(bench.go(0.15), ExtruderState::Running);
@@ -114,7 +115,7 @@ fn reports_that_stay_out_are_a_hold_then_a_fault() {
 
 #[test]
 fn a_fault_stays_until_the_robot_is_idle() {
-    let mut bench = Bench::new(Law::Constant(30.0));
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
     bench.go(0.5);
     bench.report = Some(report(PumpMode::Fault, 0.0));
     assert_eq!(bench.go(0.1), ExtruderState::Fault(ExtruderFault::Pump));
@@ -130,7 +131,7 @@ fn a_fault_stays_until_the_robot_is_idle() {
 
 #[test]
 fn too_high_a_pressure_stops_the_pump_and_leaves_the_valve_open() {
-    let mut bench = Bench::new(Law::Constant(30.0));
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
     bench.go(0.5);
     let mut high = report(PumpMode::On, 30.0);
     high.pressure_mpa = Some(MPa::constant(2.1));
@@ -141,7 +142,7 @@ fn too_high_a_pressure_stops_the_pump_and_leaves_the_valve_open() {
 
 #[test]
 fn a_screw_that_does_not_turn_as_it_was_told_is_a_hold_then_a_fault() {
-    let mut bench = Bench::new(Law::Constant(30.0));
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
     bench.go(0.5);
     bench.report = Some(report(PumpMode::On, 25.0));
     assert_eq!(bench.go(0.4), ExtruderState::Running);
@@ -155,7 +156,7 @@ fn a_screw_that_does_not_turn_as_it_was_told_is_a_hold_then_a_fault() {
 
 #[test]
 fn a_link_that_is_down_takes_no_command_and_is_given_up_in_time() {
-    let mut bench = Bench::new(Law::Constant(30.0));
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
     bench.go(0.5);
     bench.side.link_went_down(Stamp::from_secs(0.5));
     bench.report = None;
@@ -169,8 +170,9 @@ fn a_link_that_is_down_takes_no_command_and_is_given_up_in_time() {
 
 #[test]
 fn a_profile_is_played_from_the_moment_the_pump_runs_within_the_fastest_change() {
-    let profile = Profile::new(vec![(0.0, 10.0), (0.5, 50.0)]).unwrap();
-    let mut bench = Bench::new(Law::Profile(profile));
+    let at = |from_s, value| Point { from_s, value };
+    let profile = Profile::new(vec![at(0.0, 10.0), at(0.5, 50.0)], 9.0).unwrap();
+    let mut bench = Bench::new(Law::Profile(Played::new(profile)));
     bench.report = Some(ExtruderReport { screw_rpm: None, ..report(PumpMode::On, 0.0) });
     bench.go(0.4);
     assert_eq!(bench.last().value, 10.0);
@@ -183,7 +185,7 @@ fn a_profile_is_played_from_the_moment_the_pump_runs_within_the_fastest_change()
 
 #[test]
 fn ending_a_run_stops_the_pump_at_once() {
-    let mut bench = Bench::new(Law::Constant(30.0));
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
     bench.go(0.5);
     assert!(!bench.side.stop().unwrap().pump_on);
     assert_eq!(bench.side.state(), ExtruderState::Off);

@@ -11,7 +11,7 @@ use super::series::Series;
 use super::strip::{Mark, Strip};
 use super::strips::{self, Row};
 use crate::control::{Event, Step};
-use crate::extruder::{ExtruderReport, ExtruderState, Quantity};
+use crate::extruder::{Drive, ExtruderReport, ExtruderState};
 use crate::offline::names;
 use crate::time::Stamp;
 use crate::units::Mm3PerS;
@@ -71,11 +71,11 @@ impl ExtruderCharts {
         push(&mut self.filled, report.filled_mm.map(f64::from));
     }
 
-    /// The section of the page, for an extruder that is told this quantity.
-    pub fn section(&self, quantity: Quantity) -> Markup {
+    /// The section of the page, for an extruder that is told this drive.
+    pub fn section(&self, drive: Drive) -> Markup {
         let Some(range) = self.command.extent() else { return html! {} };
         let axis = XAxis::time(range);
-        let told = format!("command [{}]", quantity.symbol());
+        let told = format!("command [{}]", drive.unit());
         html! {
             section {
                 h2 { "The extruder" }
@@ -84,9 +84,9 @@ impl ExtruderCharts {
                     Row { name: "state", strip: &self.states, ink: palette::state },
                     Row { name: "limit", strip: &self.limits, ink: limit },
                 ]))
-                (self.command_plot(&axis, &told, quantity == Quantity::Rpm))
+                (self.command_plot(&axis, &told, drive == Drive::Rpm))
                 (sensor(&axis, &self.pressure, "pressure [MPa]", palette::PRESSURE))
-                @if quantity != Quantity::Rpm {
+                @if drive != Drive::Rpm {
                     (sensor(&axis, &self.screw, "screw [rpm]", palette::SCREW))
                 }
                 (sensor(&axis, &self.filled, "filled length [mm]", palette::MODEL))

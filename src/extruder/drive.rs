@@ -2,10 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::identify::quantity::Unit;
+
 /// The quantity of an extruder's command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Quantity {
+pub enum Drive {
     /// Speed of a screw or a wheel \[rpm\].
     Rpm,
     /// Voltage of a drive \[V\].
@@ -20,7 +22,7 @@ pub enum Quantity {
     Filling,
 }
 
-impl Quantity {
+impl Drive {
     /// All of them with the word that a cell file has for each.
     pub const WORDS: [(&'static str, Self); 6] = [
         ("rpm", Self::Rpm),
@@ -31,15 +33,15 @@ impl Quantity {
         ("filling", Self::Filling),
     ];
 
-    /// Symbol of its unit.
-    pub const fn symbol(self) -> &'static str {
+    /// Its unit.
+    pub const fn unit(self) -> Unit {
         match self {
-            Self::Rpm => "rpm",
-            Self::Volts => "V",
-            Self::Pressure => "MPa",
-            Self::Flow => "mm³/s",
-            Self::MassFlow => "kg/s",
-            Self::Filling => "of 1",
+            Self::Rpm => Unit::Rpm,
+            Self::Volts => Unit::Volt,
+            Self::Pressure => Unit::MPa,
+            Self::Flow => Unit::Mm3PerS,
+            Self::MassFlow => Unit::KgPerS,
+            Self::Filling => Unit::One,
         }
     }
 }

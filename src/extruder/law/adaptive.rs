@@ -1,0 +1,148 @@
+//! The adaptive law of the nozzle behind the face of a strategy: the wanted
+//! flow becomes a speed in the nozzle, the mass flow that is fed is commanded.
+//! Mohammadi Looey et al. 2026, eq. (8); the strand's sub-system commands the
+//! plate, which is the robot's side.
+
+use super::{Need, Strategy, Wish};
+use crate::extruder::adaptive::{FirstOrder, Law as Adaptive};
+use crate::extruder::report::ExtruderReport;
+use crate::time::{Span, Stamp};
+use crate::units::{Mm2, Mm3PerS};
+
+/// Metres in a millimetre.
+const M_PER_MM: f64 = 1e-3;
+
+/// What the law has to know beside its gains.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NozzleModel {
+    /// Section of the nozzle, by which a flow is a speed.
+    pub section: Mm2,
+    /// (β1/β3)·p of a constant pressure gradient, as a part of the feed
+    /// \[kg/s\].
+    pub pressure_kg_per_s: f64,
+}
+
+/// The law with its nozzle. The flow at the nozzle must be reported.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AdaptiveNozzle {
+    law: Adaptive,
+    nozzle: NozzleModel,
+    reference: f64,
+    wish: Wish,
+    begun: bool,
+}
+
+impl AdaptiveNozzle {
+    /// Before its first bead.
+    pub fn new(law: Adaptive, nozzle: NozzleModel) -> Self {
+        Self { law, nozzle, reference: 0.0, wish: Wish::default(), begun: false }
+    }
+
+    /// Speed in the nozzle \[m/s\].
+    fn speed(&self, flow: Mm3PerS) -> f64 {
+        flow.get() / self.nozzle.section.get() * M_PER_MM
+    }
+
+    /// The feed that holds a speed in the nozzle if nothing is unknown
+    /// \[kg/s\].
+    fn holding(&self, speed: f64) -> f64 {
+        let FirstOrder { state_gain_per_s, input_gain } = self.law.plant();
+        -state_gain_per_s / input_gain * speed - self.nozzle.pressure_kg_per_s
+    }
+}
+
+impl Strategy for AdaptiveNozzle {
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Flow]
+    }
+
+    fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> Wish {
+        let speed = self.speed(flow);
+        self.reference = self.law.reference_for(speed);
+        // What was learnt on the last bead still holds.
+        self.wish = Wish::known(self.holding(speed) - self.law.estimate());
+        self.begun = false;
+        self.wish
+    }
+
+    fn foresee(&mut self, _dt: Span, flow: Mm3PerS) {
+        self.reference = self.law.reference_for(self.speed(flow));
+    }
+
+    fn answer(&mut self, _now: Stamp, dt: Span, report: &ExtruderReport) {
+        let Some(flow) = report.flow_mm3_per_s else { return };
+        let (measured, known) = (self.speed(flow), self.nozzle.pressure_kg_per_s);
+        if !self.begun {
+            self.begun = true;
+            self.law.start(measured, self.wish.value, known);
+        }
+        let action = self.law.step(measured, self.reference, known, dt);
+        let feedforward = self.holding(action.model);
+        self.wish =
+            Wish { value: action.command, feedforward, feedback: action.command - feedforward };
+    }
+
+    fn wish(&self) -> Wish {
+        self.wish
+    }
+
+    fn settle(&mut self, _now: Stamp, applied: f64) {
+        self.law.settle(applied);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::extruder::adaptive::{Adaptation, Gains, Safety};
+    use crate::units::Mm2;
+
+    fn law() -> AdaptiveNozzle {
+        let plant = FirstOrder { state_gain_per_s: -1.0, input_gain: 1.0 };
+        let adaptation = Adaptation::Constant { learning_rate: 4.0, weight: 1.0 };
+        let gains =
+            Gains { feedback: 1.604, error_feedback: 0.0, adaptation, safety: Safety::default() };
+        let law = Adaptive::new(plant, gains, Span::from_millis(50)).unwrap();
+        let nozzle = NozzleModel { section: Mm2::constant(100.0), pressure_kg_per_s: 0.0 };
+        AdaptiveNozzle::new(law, nozzle)
+    }
+
+    fn report(flow: f64) -> ExtruderReport {
+        ExtruderReport {
+            pump: crate::extruder::PumpMode::On,
+            valve_open: true,
+            screw_rpm: None,
+            pressure_mpa: None,
+            flow_mm3_per_s: Some(Mm3PerS::constant(flow)),
+            filled_mm: None,
+        }
+    }
+
+    /// Runs the law against its plant with a part that it does not know; gives
+    /// the flow at the end.
+    fn after(secs: f64, unknown: f64) -> f64 {
+        let (mut law, wanted) = (law(), Mm3PerS::constant(1000.0));
+        let (mut speed, mut now) = (0.01, Stamp::START);
+        let mut command = law.begin(now, wanted).value;
+        let mut dt = Span::ZERO;
+        while now.secs() < secs {
+            law.foresee(dt, wanted);
+            law.answer(now, dt, &report(speed * 100.0 / M_PER_MM));
+            command = law.wish().value;
+            law.settle(now, command);
+            dt = Span::from_millis(50);
+            let kept = (-dt.secs()).exp();
+            speed = kept * speed + (1.0 - kept) * (command + unknown);
+            now = now + dt;
+        }
+        assert!(command.is_finite());
+        speed * 100.0 / M_PER_MM
+    }
+
+    #[test]
+    fn a_feed_that_slips_is_learnt_until_the_flow_is_the_wanted_one() {
+        assert!((after(20.0, 0.0) - 1000.0).abs() < 0.1);
+        assert!((after(40.0, -0.004) - 1000.0).abs() < 1.0);
+        assert!(after(0.5, -0.004) < 900.0);
+    }
+}

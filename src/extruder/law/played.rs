@@ -1,0 +1,61 @@
+//! Commands that answer nothing: one for all of a bead, or a profile that was
+//! written down beforehand.
+
+use super::{Strategy, Wish};
+use crate::extruder::report::ExtruderReport;
+use crate::identify::profile::Profile;
+use crate::time::{Span, Stamp};
+use crate::units::Mm3PerS;
+
+/// One command for as long as bead is laid, in the unit of the command.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Constant(pub f64);
+
+impl Strategy for Constant {
+    fn begin(&mut self, _now: Stamp, _flow: Mm3PerS) -> Wish {
+        self.wish()
+    }
+
+    fn foresee(&mut self, _dt: Span, _flow: Mm3PerS) {}
+
+    fn answer(&mut self, _now: Stamp, _dt: Span, _report: &ExtruderReport) {}
+
+    fn wish(&self) -> Wish {
+        Wish::known(self.0)
+    }
+
+    fn settle(&mut self, _now: Stamp, _applied: f64) {}
+}
+
+/// A profile that is played from the moment on which the pump runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Played {
+    profile: Profile,
+    at_s: f64,
+}
+
+impl Played {
+    /// From its beginning.
+    pub const fn new(profile: Profile) -> Self {
+        Self { profile, at_s: 0.0 }
+    }
+}
+
+impl Strategy for Played {
+    fn begin(&mut self, _now: Stamp, _flow: Mm3PerS) -> Wish {
+        self.at_s = 0.0;
+        self.wish()
+    }
+
+    fn foresee(&mut self, dt: Span, _flow: Mm3PerS) {
+        self.at_s += dt.max(Span::ZERO).secs();
+    }
+
+    fn answer(&mut self, _now: Stamp, _dt: Span, _report: &ExtruderReport) {}
+
+    fn wish(&self) -> Wish {
+        Wish::known(self.profile.at(self.at_s))
+    }
+
+    fn settle(&mut self, _now: Stamp, _applied: f64) {}
+}

@@ -1,0 +1,88 @@
+//! A profile as a table: `time_s` and the quantity. The last line tells the
+//! end; it repeats the last value.
+
+use std::fmt::Write;
+
+use super::{Point, Profile, ProfileError};
+use crate::identify::quantity::Quantity;
+use crate::identify::table::{Table, TableError};
+
+/// The column of time.
+const TIME: &str = "time_s";
+
+/// A file that holds no profile.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ProfileFileError {
+    /// It is no table.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// Its columns are others.
+    #[error("the columns are {}; expected time_s and one quantity whose name ends with its unit, such as screw_rpm", .found.join(", "))]
+    Columns {
+        /// Those that are there.
+        found: Vec<String>,
+    },
+    /// It has too few lines.
+    #[error("a profile has two lines or more: each value with its time, and the end")]
+    Short,
+    /// Its values make none.
+    #[error(transparent)]
+    Profile(#[from] ProfileError),
+}
+
+/// Reads a profile, and what it commands.
+pub fn parse(text: &str) -> Result<(Profile, Quantity), ProfileFileError> {
+    let table = Table::parse(text)?;
+    let other = || ProfileFileError::Columns { found: table.names().to_vec() };
+    let [time, column] = table.names() else { return Err(other()) };
+    let quantity = Quantity::of_column(column, None).filter(|_| time == TIME).ok_or_else(other)?;
+    let times = table.column(time)?;
+    let values = table.column(column)?;
+    let (Some((end_s, begins)), true) = (times.split_last(), times.len() > 1) else {
+        return Err(ProfileFileError::Short);
+    };
+    let points = begins.iter().zip(values).map(|(&from_s, value)| Point { from_s, value });
+    Ok((Profile::new(points.collect(), *end_s)?, quantity))
+}
+
+/// The text of a profile's file; `column` ends with the unit.
+pub fn to_csv(profile: &Profile, column: &str) -> String {
+    let mut text = format!("{TIME},{column}\n");
+    let end = profile.points().last().map(|last| (profile.end_s(), last.value));
+    let points = profile.points().iter().map(|point| (point.from_s, point.value));
+    for (time_s, value) in points.chain(end) {
+        // To the nanosecond, without what a sum of steps leaves beyond. Writing to a
+        // string cannot fail.
+        let _ = writeln!(text, "{},{value}", (time_s * 1e9).round() / 1e9);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+    use crate::identify::quantity::Unit;
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let value = |k: u32| 20.0 + f64::from(k * k % 7) / 3.0;
+        let points = (0..50).map(|k| Point { from_s: f64::from(k) * 0.5, value: value(k) });
+        let profile = Profile::new(points.collect(), 24.9).unwrap();
+        let text = to_csv(&profile, "screw_rpm");
+        assert!(text.starts_with("time_s,screw_rpm\n0,20\n0.5,20.333333333333332\n"), "{text}");
+        let (read, quantity) = parse(&text).unwrap();
+        assert_eq!((read, quantity.unit), (profile, Unit::Rpm));
+    }
+
+    #[test]
+    fn what_is_no_profile_is_told() {
+        let said = |text: &str| parse(text).unwrap_err().to_string();
+        assert!(said("time_s,speed\n0,1\n1,1\n").contains("the columns are time_s, speed"));
+        assert!(said("time_ms,rpm\n0,1\n1,1\n").contains("expected time_s"));
+        assert!(said("time_s,rpm\n0,1\n").contains("two lines or more"));
+        assert!(said("time_s,rpm\n0,1\n2,3\n2,3\n").contains("ends at 2 s"));
+        assert!(said("time_s,rpm\n0,1\n1,fast\n2,1\n").contains("line 3, column rpm"));
+    }
+}
