@@ -51,11 +51,13 @@ fn a_pump_that_never_starts_stops_the_robot_with_the_reason() {
 }
 
 #[test]
-fn half_the_flow_is_answered_by_the_robot_as_far_as_its_limits_go() {
-    let (_, _, summary) = simulated(&[("constant_rpm = 60.0", "constant_rpm = 45.0")]);
+fn the_robot_slows_down_where_less_flows() {
     let (_, _, full) = simulated(&[]);
-    let limited = |summary: &serde_json::Value| summary["limited_s"].as_f64().unwrap();
-    assert!(limited(&summary) > limited(&full), "{summary}");
+    let (_, _, less) = simulated(&[("constant_rpm = 60.0", "constant_rpm = 50.0")]);
+    let took = |summary: &serde_json::Value| summary["duration_s"].as_f64().unwrap();
+    assert!(took(&less) > 1.05 * took(&full), "{less}");
+    let settled = less["width_error_rms_settled_mm"].as_f64().unwrap();
+    assert!(settled < 1.0, "{less}");
 }
 
 #[test]
