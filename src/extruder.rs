@@ -15,6 +15,7 @@ pub mod law;
 pub mod limits;
 pub mod rates;
 pub mod report;
+pub mod screw;
 pub mod state;
 pub mod supervisor;
 

@@ -1,0 +1,231 @@
+//! What to feed now: the plug is measured, foretold to when the feed arrives,
+//! and the law is asked there, eq. (74) of Diagne et al. 2015.
+
+use super::error::{ScrewError, positive};
+use super::euler::{Euler, whole};
+use super::exact::{Exact, Overtaken, Prediction};
+use super::history::History;
+use super::law::FillLaw;
+use super::model::{Conveying, Screw};
+use crate::time::{Span, Stamp};
+use crate::units::Mm;
+
+const MM_PER_M: f64 = 1000.0;
+/// Most changes of the feed that are remembered.
+const MOST_STEPS: usize = 1 << 16;
+
+/// How the prediction is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scheme {
+    /// Over the exact delay interval, to high order, at any moments.
+    Exact,
+    /// The paper's Euler steps on a fixed grid.
+    Paper,
+}
+
+/// What a control of the screw is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScrewSettings {
+    /// The screw as it is known. [`Screw::steady`] of it makes the predictor
+    /// that knows of no pulsation, eqs. (105) to (112).
+    pub screw: Screw,
+    /// The law.
+    pub law: FillLaw,
+    /// How the prediction is computed.
+    pub scheme: Scheme,
+    /// Time between steps. The exact scheme takes steps at half that distance
+    /// and more, the paper's only whole multiples of it.
+    pub period: Span,
+    /// Share of full that has been fed up to the first step, from 0 to below 1.
+    pub before: f64,
+}
+
+/// The control with its memory of the feed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScrewControl {
+    law: FillLaw,
+    predictor: Predictor,
+    length: Mm,
+    period: Span,
+    last: Option<Stamp>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Predictor {
+    Exact { exact: Exact, history: History },
+    Paper(Euler),
+}
+
+/// A decision.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScrewStep {
+    /// Share of full to feed from now on, U.
+    pub fill: f64,
+    /// Length of the plug when that arrives, P.
+    pub plug: Mm,
+    /// When it arrives, σ.
+    pub arrival: Stamp,
+    /// Delay of what arrives now, D.
+    pub delay: Span,
+}
+
+/// Why there is no decision. What was fed last stays in force, and the control
+/// counts on that unless it is told with [`ScrewControl::applied`].
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum ScrewFault {
+    /// A plug that no screw has.
+    #[error(
+        "a plug of {} was measured in a screw of {}; check the sensor's zero and unit",
+        plug,
+        length
+    )]
+    Outside {
+        /// What was measured.
+        plug: Mm,
+        /// The screw's length.
+        length: Mm,
+    },
+    /// The feed would not arrive.
+    #[error(transparent)]
+    Overtaken(#[from] Overtaken),
+    /// A step that is not after the last one, or too soon after it.
+    #[error("{} s after the last step is too soon: steps are {} s apart", since.secs(), period.secs())]
+    TooSoon {
+        /// Time since the last step.
+        since: Span,
+        /// What was set.
+        period: Span,
+    },
+    /// A step that is not on the paper's grid.
+    #[error("{} s after the last step is not on the grid of {} s that the paper's scheme steps on", since.secs(), period.secs())]
+    OffGrid {
+        /// Time since the last step.
+        since: Span,
+        /// What was set.
+        period: Span,
+    },
+    /// A share that cannot have been fed.
+    #[error("a share of {fill} cannot have been fed; it must be from 0 to below 1")]
+    Share {
+        /// What was told.
+        fill: f64,
+    },
+}
+
+impl ScrewControl {
+    /// A control before its first step. Whether the screw is feasible at all is
+    /// a question for [`super::feasible::Feasibility::judge`].
+    pub fn new(settings: &ScrewSettings) -> Result<Self, ScrewError> {
+        let screw = Screw::new(settings.screw)?;
+        let period_s = positive("period", settings.period.secs())?;
+        if !(0.0..1.0).contains(&settings.before) {
+            return Err(ScrewError::Before { fill: settings.before });
+        }
+        let delay_s = screw.longest_delay();
+        // Steps may come at half the period.
+        let steps = (2.0 * delay_s / period_s).ceil() + 2.0;
+        let room = whole(steps);
+        if room > MOST_STEPS {
+            return Err(ScrewError::Memory { period_s, delay_s, steps, most: MOST_STEPS });
+        }
+        let predictor = match settings.scheme {
+            Scheme::Exact => Predictor::Exact {
+                exact: Exact::new(screw),
+                history: History::new(room, settings.before),
+            },
+            Scheme::Paper if screw.conveying == Conveying::AtSpeedOnTheWay => {
+                return Err(ScrewError::SchemeOnTheWay);
+            }
+            Scheme::Paper => Predictor::Paper(Euler::new(screw, period_s, room, settings.before)),
+        };
+        Ok(Self {
+            law: settings.law,
+            predictor,
+            length: Mm::new(screw.length_m * MM_PER_M).unwrap_or_default(),
+            period: settings.period,
+            last: None,
+        })
+    }
+
+    /// Decides what to feed from now on, from the plug measured now.
+    pub fn step(&mut self, now: Stamp, plug: Mm) -> Result<ScrewStep, ScrewFault> {
+        self.pass(now)?;
+        self.last = Some(now);
+        let decided = self.decide(now, plug);
+        let fill = decided.as_ref().map_or(self.fed(), |step| step.fill);
+        self.predictor.push(now, fill);
+        decided
+    }
+
+    /// Tells what is fed from a moment on, where that is not what the last step
+    /// decided: a limit acted, or an operator.
+    pub fn applied(&mut self, from: Stamp, fill: f64) -> Result<(), ScrewFault> {
+        if !(0.0..1.0).contains(&fill) {
+            return Err(ScrewFault::Share { fill });
+        }
+        match &mut self.predictor {
+            Predictor::Exact { exact, history } => history.push(exact.place(from.secs()), fill),
+            Predictor::Paper(euler) => euler.amend(fill),
+        }
+        Ok(())
+    }
+
+    /// The share that is fed now, as far as is known.
+    pub fn fed(&self) -> f64 {
+        match &self.predictor {
+            Predictor::Exact { history, .. } => history.last(),
+            Predictor::Paper(euler) => euler.last(),
+        }
+    }
+
+    fn decide(&self, now: Stamp, plug: Mm) -> Result<ScrewStep, ScrewFault> {
+        if !(plug >= Mm::ZERO && plug < self.length) {
+            return Err(ScrewFault::Outside { plug, length: self.length });
+        }
+        let foretold = self.predictor.predict(now, plug.get() / MM_PER_M)?;
+        Ok(ScrewStep {
+            fill: self.law.fill(foretold.plug_m),
+            plug: Mm::new(foretold.plug_m * MM_PER_M).unwrap_or_default(),
+            arrival: Stamp::from_secs(foretold.arrival_s),
+            delay: Span::from_secs(foretold.delay_s),
+        })
+    }
+
+    /// Lets the time pass since the last step, if a step may be made now.
+    fn pass(&mut self, now: Stamp) -> Result<(), ScrewFault> {
+        let Some(last) = self.last else { return Ok(()) };
+        let (since, period) = (now - last, self.period);
+        let steps = since.secs() / period.secs();
+        if steps < 0.5 {
+            return Err(ScrewFault::TooSoon { since, period });
+        }
+        if let Predictor::Paper(euler) = &mut self.predictor {
+            if (steps - steps.round()).abs() > 0.01 {
+                return Err(ScrewFault::OffGrid { since, period });
+            }
+            for _ in 1..whole(steps.round()).min(MOST_STEPS) {
+                euler.push(euler.last());
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Predictor {
+    fn predict(&self, now: Stamp, plug_m: f64) -> Result<Prediction, Overtaken> {
+        match self {
+            Self::Exact { exact, history } => exact.predict(history, now.secs(), plug_m),
+            Self::Paper(euler) => euler.predict(now.secs(), plug_m),
+        }
+    }
+
+    fn push(&mut self, now: Stamp, fill: f64) {
+        match self {
+            Self::Exact { exact, history } => history.push(exact.place(now.secs()), fill),
+            Self::Paper(euler) => euler.push(fill),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,146 @@
+use super::*;
+use crate::extruder::screw::law::Setpoint;
+use crate::extruder::screw::{PiecewiseExponential, Pulsation, Saturated, ScrewDesign};
+use proptest::prelude::*;
+
+const SETPOINT: Setpoint = Setpoint { plug: Mm::constant(160.0), most: 0.9 };
+
+fn settings(scheme: Scheme) -> ScrewSettings {
+    let pulsation = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
+    let screw = ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap();
+    let law = PiecewiseExponential::new(&screw, SETPOINT, 36.0).unwrap();
+    let law = FillLaw::Exponential(law);
+    let before = screw.holding(0.1);
+    ScrewSettings { screw, law, scheme, period: Span::from_millis(5), before }
+}
+
+fn control(scheme: Scheme) -> ScrewControl {
+    ScrewControl::new(&settings(scheme)).unwrap()
+}
+
+fn at(ms: i64) -> Stamp {
+    Stamp::START + Span::from_millis(ms)
+}
+
+#[test]
+fn a_plug_that_is_held_stays_foretold_and_arrives_after_its_delay() {
+    for scheme in [Scheme::Exact, Scheme::Paper] {
+        let step = control(scheme).step(at(0), Mm::constant(100.0)).unwrap();
+        assert!((step.plug.get() - 100.0).abs() < 1e-9, "{scheme:?}");
+        assert!((step.arrival.secs() - 1.137).abs() < 6e-3, "{scheme:?}");
+        assert!((step.fill - settings(scheme).law.fill(0.1)).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_plug_that_no_screw_has_is_refused_and_the_feed_stays_in_force() {
+    for scheme in [Scheme::Exact, Scheme::Paper] {
+        let mut control = control(scheme);
+        let fed = control.step(at(0), Mm::constant(150.0)).unwrap().fill;
+        for (tick, plug) in (1..).zip([-0.1, 200.0, 1e6]) {
+            let fault = control.step(at(5 * tick), Mm::constant(plug)).unwrap_err();
+            assert!(matches!(fault, ScrewFault::Outside { .. }), "{plug}");
+            assert_eq!(control.fed(), fed);
+        }
+        assert!(control.step(at(20), Mm::constant(150.0)).is_ok());
+    }
+    let fault = control(Scheme::Exact).step(at(0), Mm::constant(250.0)).unwrap_err();
+    assert_eq!(
+        fault.to_string(),
+        "a plug of 250 mm was measured in a screw of 200 mm; check the sensor's zero and unit"
+    );
+}
+
+#[test]
+fn steps_come_in_order_and_where_the_scheme_can_take_them() {
+    let plug = Mm::constant(120.0);
+    let mut exact = control(Scheme::Exact);
+    exact.step(at(10), plug).unwrap();
+    for early in [0, 10, 12] {
+        let fault = exact.step(at(early), plug).unwrap_err();
+        assert!(matches!(fault, ScrewFault::TooSoon { .. }), "{early}");
+    }
+    assert!(exact.step(at(13), plug).is_ok());
+    assert!(exact.step(at(900), plug).is_ok());
+    let mut paper = control(Scheme::Paper);
+    paper.step(at(0), plug).unwrap();
+    let fault = paper.step(at(8), plug).unwrap_err();
+    assert!(matches!(fault, ScrewFault::OffGrid { .. }));
+    assert!(paper.step(at(500), plug).is_ok());
+}
+
+#[test]
+fn what_was_applied_counts_and_not_what_was_decided() {
+    for scheme in [Scheme::Exact, Scheme::Paper] {
+        let (mut told, mut untold) = (control(scheme), control(scheme));
+        for tick in 0..100 {
+            let plug = Mm::constant(120.0);
+            let _ = untold.step(at(5 * tick), plug).unwrap();
+            let _ = told.step(at(5 * tick), plug).unwrap();
+            told.applied(at(5 * tick), 0.1).unwrap();
+            assert_eq!(told.fed(), 0.1);
+        }
+        let foretold = |control: &mut ScrewControl| {
+            control.step(at(500), Mm::constant(120.0)).unwrap().plug.get()
+        };
+        assert!(foretold(&mut told) + 5.0 < foretold(&mut untold));
+        for fill in [-0.1, 1.0, f64::NAN] {
+            assert!(matches!(told.applied(at(500), fill), Err(ScrewFault::Share { .. })));
+        }
+    }
+}
+
+#[test]
+fn settings_that_cannot_be_are_refused() {
+    let sound = settings(Scheme::Exact);
+    let refused = |settings| ScrewControl::new(&settings).unwrap_err();
+    let filled = ScrewSettings { before: 1.0, ..sound };
+    assert!(matches!(refused(filled), ScrewError::Before { .. }));
+    let still = ScrewSettings { period: Span::ZERO, ..sound };
+    assert!(matches!(refused(still), ScrewError::NotPositive { name: "period", .. }));
+    let often = ScrewSettings { period: Span::from_ns(1_000), ..sound };
+    assert!(matches!(refused(often), ScrewError::Memory { .. }));
+    let belt = Screw { conveying: Conveying::AtSpeedOnTheWay, ..sound.screw };
+    let belt = ScrewSettings { screw: belt, scheme: Scheme::Paper, ..sound };
+    assert_eq!(refused(belt), ScrewError::SchemeOnTheWay);
+    let broken = Screw { theta2_per_m: f64::NAN, ..sound.screw };
+    let broken = ScrewSettings { screw: broken, ..sound };
+    assert!(matches!(refused(broken), ScrewError::NotPositive { name: "theta2_per_m", .. }));
+}
+
+proptest! {
+    #[test]
+    fn the_feed_keeps_its_limits_whatever_is_measured(
+        plugs in prop::collection::vec(-20.0..220.0_f64, 1..300),
+        share in 0.0..0.9_f64,
+        rad_per_s in 0.0..8.0_f64,
+        phase_rad in -4.0..4.0_f64,
+        slope in 7.0..2_000.0_f64,
+        paper in any::<bool>(),
+        belt in any::<bool>(),
+        straight in any::<bool>(),
+    ) {
+        let pulsation = Pulsation { share, rad_per_s, phase_rad };
+        let screw = ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap();
+        let conveying =
+            if belt && !paper { Conveying::AtSpeedOnTheWay } else { Conveying::AtPresentSpeed };
+        let screw = Screw { conveying, ..screw };
+        let law = if straight {
+            FillLaw::Saturated(Saturated::new(&screw, SETPOINT, slope).unwrap())
+        } else {
+            FillLaw::Exponential(PiecewiseExponential::new(&screw, SETPOINT, slope).unwrap())
+        };
+        let scheme = if paper { Scheme::Paper } else { Scheme::Exact };
+        let settings = ScrewSettings { screw, law, ..settings(scheme) };
+        let mut control = ScrewControl::new(&settings).unwrap();
+        for (tick, plug) in (0..).zip(plugs) {
+            let step = control.step(at(5 * tick), Mm::constant(plug));
+            prop_assert!((0.0..=0.9).contains(&control.fed()));
+            if let Ok(step) = step {
+                prop_assert_eq!(step.fill, control.fed());
+                prop_assert!((0.0..=200.0).contains(&step.plug.get()));
+                prop_assert!(step.arrival >= at(5 * tick));
+            }
+        }
+    }
+}

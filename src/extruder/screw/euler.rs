@@ -1,0 +1,118 @@
+//! The predictor as Diagne et al. 2015 compute it, eqs. (50) and (51): a grid
+//! of time steps, the delay cut to whole steps, left endpoints. It is kept to
+//! reproduce the paper and to show what it leaves out; [`super::exact`] is the
+//! one to use.
+
+use super::exact::{MOST_GROWTH, Overtaken, Prediction};
+use super::model::Screw;
+
+/// The predictor with the feed of the last steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Euler {
+    screw: Screw,
+    step_s: f64,
+    /// Shares fed, a ring; `newest` is the place of the last.
+    fed: Box<[f64]>,
+    newest: usize,
+}
+
+impl Euler {
+    /// Steps of a fixed length, after a feed that has been held for longer than
+    /// the delay. `steps` is how many the longest delay may have.
+    pub fn new(screw: Screw, step_s: f64, steps: usize, before: f64) -> Self {
+        Self { screw, step_s, fed: vec![before; steps.max(1)].into_boxed_slice(), newest: 0 }
+    }
+
+    /// The screw that it knows.
+    pub fn screw(&self) -> &Screw {
+        &self.screw
+    }
+
+    /// What is fed over the step that begins now.
+    pub fn push(&mut self, fill: f64) {
+        self.newest = if self.newest + 1 == self.fed.len() { 0 } else { self.newest + 1 };
+        self.amend(fill);
+    }
+
+    /// What was applied instead of the share that was pushed last.
+    pub fn amend(&mut self, fill: f64) {
+        if let Some(slot) = self.fed.get_mut(self.newest) {
+            *slot = fill;
+        }
+    }
+
+    /// The share that is fed now.
+    pub fn last(&self) -> f64 {
+        self.back(0)
+    }
+
+    /// What was fed a number of steps before the last.
+    fn back(&self, steps: usize) -> f64 {
+        let place = (self.newest + self.fed.len() - steps) % self.fed.len();
+        self.fed.get(place).copied().unwrap_or_default()
+    }
+
+    /// Foretells from a plug that was measured now, before anything is pushed
+    /// for the step that begins.
+    pub fn predict(&self, now_s: f64, plug_m: f64) -> Result<Prediction, Overtaken> {
+        let screw = &self.screw;
+        let delay_s = screw.delay(now_s, plug_m);
+        let (mut plug, mut arrival) = (plug_m, now_s);
+        for steps in (0..whole(delay_s / self.step_s).min(self.fed.len())).rev() {
+            let fill = self.back(steps);
+            let (speed, slowing) = moving(screw, arrival);
+            let growth = slowing * (screw.length_m - plug) - screw.growth(plug, fill);
+            if growth.is_nan() || growth >= MOST_GROWTH {
+                return Err(Overtaken { growth, plug_m: plug });
+            }
+            let stretch = self.step_s / (1.0 - growth);
+            plug = (plug + stretch * speed * screw.growth(plug, fill)).clamp(0.0, screw.length_m);
+            arrival += stretch;
+        }
+        Ok(Prediction { plug_m: plug, arrival_s: arrival, delay_s })
+    }
+}
+
+/// Conveying speed \[m/s\], and ∂D/∂t for each metre of way, θ1·ε·ω·sin(ωt)/c²,
+/// eq. (82).
+fn moving(screw: &Screw, at_s: f64) -> (f64, f64) {
+    let pulsation = screw.pulsation;
+    let (sin, cos) = libm::sincos(pulsation.rad_per_s * at_s + pulsation.phase_rad);
+    let speed = screw.theta1_m_per_s * (1.0 + pulsation.share * cos);
+    let turns = screw.theta1_m_per_s * pulsation.share * pulsation.rad_per_s * sin;
+    (speed, turns / (speed * speed))
+}
+
+/// Whole steps in a delay, as (50) cuts it.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+pub(super) fn whole(steps: f64) -> usize {
+    steps.floor() as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::extruder::screw::exact::Exact;
+    use crate::extruder::screw::history::History;
+    use crate::extruder::screw::{Pulsation, ScrewDesign};
+
+    #[test]
+    fn finer_steps_lead_to_the_exact_prediction() {
+        let pulsation = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
+        let screw = ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap();
+        let feed = |at_s: f64| if at_s < 0.7 { 0.2 } else { 0.6 };
+        let mut history = History::new(8, 0.2);
+        history.push(0.7, 0.6);
+        let truth = Exact::new(screw).predict(&history, 1.2, 0.12).unwrap();
+        let missed = |step_s: f64| {
+            let mut euler = Euler::new(screw, step_s, 1 << 15, 0.2);
+            for step in 0..whole(1.2 / step_s + 0.5) {
+                euler.push(feed(step_s * (f64::from(u32::try_from(step).unwrap()) + 0.5)));
+            }
+            (euler.predict(1.2, 0.12).unwrap().plug_m - truth.plug_m).abs()
+        };
+        let (coarse, fine) = (missed(1e-3), missed(1e-4));
+        assert!(coarse > 1e-6 && coarse < 5e-4, "{coarse}");
+        assert!(fine < 0.2 * coarse, "{fine} {coarse}");
+    }
+}

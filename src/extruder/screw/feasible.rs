@@ -1,0 +1,269 @@
+//! Whether what is fed can always reach the plug: the delay must never grow as
+//! fast as time passes. Diagne et al. 2015, eqs. (56), (79) to (81) and (88).
+
+use std::fmt;
+
+use super::model::{Conveying, Screw};
+
+/// What the delay's growth was bounded with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bound {
+    /// Largest sin/(1 + ε·cos)² over a turn, or 1/(1 − ε)² in its place.
+    pub factor: f64,
+    /// ε·ω times that factor \[rad/s\].
+    pub pulsation_rad_per_s: f64,
+    /// Largest growth of the delay for each second that passes, over all
+    /// lengths of the plug and shares fed: the most that Λ reaches, eq. (88).
+    pub growth: f64,
+    /// Length of the plug at which it grows fastest \[m\].
+    pub worst_plug_m: f64,
+    /// The paper's condition that is met, if any.
+    pub condition: Option<Condition>,
+}
+
+/// The three ways to be feasible.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Condition {
+    /// Eq. (79): the growth increases with the plug, to less than 1 at the feed.
+    Increasing,
+    /// Eq. (80): the screw is short for its nozzle, θ2·L < 1.
+    Short,
+    /// Eq. (81): the screw is long for its nozzle, θ2·L > 1.
+    Long,
+}
+
+/// Thresholds of the paper's conditions, all in rad/s beside
+/// [`Bound::pulsation_rad_per_s`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Thresholds {
+    /// θ1·θ2/(1 + θ2·L)², below which (79) holds.
+    pub increasing: f64,
+    /// Below which (80) or (81) holds: θ1/L for a short screw,
+    /// 4·θ1·θ2/(1 + θ2·L)² for a long one.
+    pub reach: f64,
+    /// θ2·L.
+    pub lead: f64,
+}
+
+/// The verdict, with all that led to it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Feasibility {
+    /// With the exact bound of the speed's part of the growth.
+    pub sharp: Bound,
+    /// With the paper's looser one, eq. (84).
+    pub printed: Bound,
+    /// What the paper's conditions compare with.
+    pub thresholds: Thresholds,
+    /// Where the delay adds up on the way nothing overtakes: always feasible.
+    pub conveying: Conveying,
+}
+
+impl Feasibility {
+    /// Judges a screw over its whole length and every share from 0 to below 1.
+    pub fn judge(screw: &Screw) -> Self {
+        let lead = screw.theta2_per_m * screw.length_m;
+        let spread = screw.theta1_m_per_s * screw.theta2_per_m / (1.0 + lead).powi(2);
+        let reach = if lead < 1.0 { screw.theta1_m_per_s / screw.length_m } else { 4.0 * spread };
+        let thresholds = Thresholds { increasing: spread, reach, lead };
+        let share = screw.pulsation.share;
+        Self {
+            sharp: Bound::over(screw, &thresholds, sharpest(share)),
+            printed: Bound::over(screw, &thresholds, 1.0 / (1.0 - share).powi(2)),
+            thresholds,
+            conveying: screw.conveying,
+        }
+    }
+
+    /// Whether every feed reaches the plug.
+    pub fn is_feasible(&self) -> bool {
+        self.conveying == Conveying::AtSpeedOnTheWay || self.sharp.growth < 1.0
+    }
+}
+
+/// The largest sin φ/(1 + ε·cos φ)² over a turn: its derivative is zero where
+/// ε·cos² φ − cos φ − 2ε = 0.
+fn sharpest(share: f64) -> f64 {
+    if share == 0.0 {
+        return 1.0;
+    }
+    // The smaller root, written so that a small share loses no digits.
+    let cos = -4.0 * share / (1.0 + (1.0 + 8.0 * share * share).sqrt());
+    (1.0 - cos * cos).max(0.0).sqrt() / (1.0 + share * cos).powi(2)
+}
+
+impl Bound {
+    fn over(screw: &Screw, thresholds: &Thresholds, factor: f64) -> Self {
+        let pulsation = screw.pulsation.share * screw.pulsation.rad_per_s * factor;
+        let (theta2, length) = (screw.theta2_per_m, screw.length_m);
+        let fall = pulsation / screw.theta1_m_per_s;
+        // Between a growing and a falling course lies one highest point (95).
+        let worst = if fall <= 0.0 { length } else { ((theta2 / fall).sqrt() - 1.0) / theta2 };
+        let worst_plug_m = worst.clamp(0.0, length);
+        Self {
+            factor,
+            pulsation_rad_per_s: pulsation,
+            growth: fall * (length - worst_plug_m) + screw.holding(worst_plug_m),
+            worst_plug_m,
+            condition: thresholds.met(pulsation),
+        }
+    }
+}
+
+impl Thresholds {
+    /// The condition that a pulsation meets. What lies on a threshold belongs
+    /// to the side that is feasible in (87).
+    fn met(&self, pulsation: f64) -> Option<Condition> {
+        if pulsation <= self.increasing {
+            Some(Condition::Increasing)
+        } else if pulsation >= self.reach {
+            None
+        } else if self.lead < 1.0 {
+            Some(Condition::Short)
+        } else {
+            Some(Condition::Long)
+        }
+    }
+}
+
+impl fmt::Display for Condition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Increasing => "condition (79)",
+            Self::Short => "condition (80)",
+            Self::Long => "condition (81)",
+        })
+    }
+}
+
+impl fmt::Display for Feasibility {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.conveying == Conveying::AtSpeedOnTheWay {
+            return f.write_str(
+                "feasible: the material keeps its order on the way, so every feed reaches the plug",
+            );
+        }
+        let Bound { growth, worst_plug_m, factor, pulsation_rad_per_s, condition } = &self.sharp;
+        let worst_mm = worst_plug_m * 1000.0;
+        if self.is_feasible() {
+            write!(
+                f,
+                "feasible: the delay grows by at most {growth:.3} s a second, at a plug of \
+                 {worst_mm:.0} mm; ε·ω·{factor:.4} = {pulsation_rad_per_s:.4} rad/s "
+            )?;
+            let limit = match condition {
+                Some(Condition::Increasing) => self.thresholds.increasing,
+                _ => self.thresholds.reach,
+            };
+            write!(f, "lies below {limit:.4}")?;
+            condition.map_or(Ok(()), |met| write!(f, ", {met}"))
+        } else {
+            write!(
+                f,
+                "not feasible: at a plug of {worst_mm:.0} mm the delay can grow by {growth:.3} s a \
+                 second, so that what is fed then arrives late or never; ε·ω·{factor:.4} = \
+                 {pulsation_rad_per_s:.4} rad/s must be below {:.4}: a weaker or slower pulsation, \
+                 a faster or shorter screw",
+                self.thresholds.reach
+            )
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::extruder::screw::{Pulsation, ScrewDesign, TurnUnit};
+    use proptest::prelude::*;
+
+    const A: Pulsation = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
+    const B: Pulsation = Pulsation { share: 0.4, rad_per_s: 0.4, phase_rad: 0.0 };
+
+    fn judge(unit: TurnUnit, pulsation: Pulsation) -> Feasibility {
+        let design = ScrewDesign { unit, ..ScrewDesign::DIAGNE_2015 };
+        Feasibility::judge(&design.screw(pulsation).unwrap())
+    }
+
+    #[test]
+    fn the_exact_factor_is_the_largest_of_a_turn() {
+        for (share, known) in [(0.1, 1.0202), (0.4, 1.3881)] {
+            assert!((sharpest(share) - known).abs() < 5e-5);
+            let seen = (0..100_000)
+                .map(|k| f64::from(k) * std::f64::consts::TAU / 100_000.0)
+                .map(|turn| turn.sin() / (1.0 + share * turn.cos()).powi(2))
+                .fold(0.0, f64::max);
+            assert!((sharpest(share) - seen).abs() < 1e-8);
+        }
+        assert!((sharpest(1e-9) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn both_published_cases_are_feasible_in_radians_and_neither_in_turns() {
+        for pulsation in [A, B] {
+            let radians = judge(TurnUnit::RadPerS, pulsation);
+            assert!(radians.is_feasible());
+            assert_eq!(radians.sharp.condition, Some(Condition::Short));
+            assert_eq!(radians.printed.condition, Some(Condition::Short));
+            let turns = judge(TurnUnit::RevPerS, pulsation);
+            assert!(!turns.is_feasible());
+            assert_eq!(turns.sharp.condition, None);
+            assert_eq!(turns.printed.condition, None);
+        }
+    }
+
+    #[test]
+    fn the_exact_bound_allows_what_the_printed_one_refuses() {
+        // 0.55·0.4/(1 − 0.55)² is 1.09 rad/s, beyond θ1/L = 0.471.
+        let strong = judge(TurnUnit::RadPerS, Pulsation { share: 0.55, ..B });
+        assert!(strong.is_feasible());
+        assert_eq!(strong.printed.condition, None);
+        assert!(strong.printed.growth > 1.0);
+    }
+
+    #[test]
+    fn the_verdict_is_said_in_words_with_its_numbers() {
+        let said = judge(TurnUnit::RadPerS, A).to_string();
+        assert_eq!(
+            said,
+            "feasible: the delay grows by at most 0.758 s a second, at a plug of 0 mm; ε·ω·1.0202 \
+             = 0.3571 rad/s lies below 0.4712, condition (80)"
+        );
+        let said = judge(TurnUnit::RevPerS, B).to_string();
+        assert!(said.starts_with("not feasible: at a plug of 0 mm the delay can grow by 2.961 s"));
+        assert!(said.contains("must be below 0.0750"), "{said}");
+    }
+
+    #[test]
+    fn a_belt_that_keeps_its_order_is_always_feasible() {
+        let screw = ScrewDesign::DIAGNE_2015.screw(A).unwrap();
+        let fast = Pulsation { share: 0.9, rad_per_s: 50.0, phase_rad: 0.0 };
+        let fast = Screw { pulsation: fast, ..screw };
+        assert!(!Feasibility::judge(&fast).is_feasible());
+        let belt = Screw { conveying: Conveying::AtSpeedOnTheWay, ..fast };
+        assert!(Feasibility::judge(&belt).is_feasible());
+    }
+
+    proptest! {
+        #[test]
+        fn the_largest_growth_is_that_of_a_search_and_the_conditions_agree_with_it(
+            share in 0.0..0.8_f64,
+            rad_per_s in 0.0..6.0_f64,
+            theta2_per_m in 0.2..40.0_f64,
+        ) {
+            let pulsation = Pulsation { share, rad_per_s, phase_rad: 0.0 };
+            let screw = ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap();
+            let screw = Screw { theta2_per_m, ..screw };
+            let verdict = Feasibility::judge(&screw);
+            let mut most = 0.0_f64;
+            for k in 0..=200 {
+                let plug = 0.001 * f64::from(k);
+                let at = share * rad_per_s * verdict.sharp.factor / screw.theta1_m_per_s;
+                most = most.max(at * (0.2 - plug) + screw.holding(plug));
+            }
+            prop_assert!((verdict.sharp.growth - most).abs() < 1e-3);
+            prop_assert!(verdict.sharp.growth >= most - 1e-12);
+            for bound in [verdict.sharp, verdict.printed] {
+                prop_assert_eq!(bound.condition.is_some(), bound.growth < 1.0);
+            }
+        }
+    }
+}

@@ -1,0 +1,340 @@
+//! The screw as a plug that grows and shrinks: Diagne et al. 2015, eqs. (13)
+//! to (17). Behind the nozzle the channel is full over the length x; from there
+//! to the feed at L it is filled to a share U that was fed a while ago.
+
+use std::f64::consts::TAU;
+
+use super::error::{ScrewError, positive};
+use crate::units::{Mm, Rpm};
+
+const MM_PER_M: f64 = 1000.0;
+
+/// What the screw's speed is multiplied with the pitch in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TurnUnit {
+    /// Radians a second; with it the paper's two cases are feasible.
+    RadPerS,
+    /// Turns a second, which is how far a screw thread conveys without slip.
+    RevPerS,
+}
+
+/// A screw as it is drawn, and what it conveys.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScrewDesign {
+    /// From the nozzle to the feed, L.
+    pub length: Mm,
+    /// The screw's pitch ξ.
+    pub pitch: Mm,
+    /// The screw's constant speed N0.
+    pub speed: Rpm,
+    /// How speed and pitch make the conveying speed.
+    pub unit: TurnUnit,
+    /// Conductance of the nozzle, `K_d` \[m³\].
+    pub nozzle_m3: f64,
+    /// Coefficient of the pressure flow in the channel, B \[m⁴\].
+    pub channel_m4: f64,
+    /// Density of the melt ρ0 \[kg/m³\].
+    pub density_kg_per_m3: f64,
+}
+
+impl ScrewDesign {
+    /// The screw of the paper's table.
+    pub const DIAGNE_2015: Self = Self {
+        length: Mm::constant(200.0),
+        pitch: Mm::constant(10.0),
+        speed: Rpm::constant(90.0),
+        unit: TurnUnit::RadPerS,
+        nozzle_m3: 2.45e-5,
+        channel_m4: 9.345e-9,
+        density_kg_per_m3: 1240.0,
+    };
+
+    /// B of a channel of a width and a depth \[m⁴\]: W·H³/12, eq. (101).
+    pub fn channel_m4(width: Mm, depth: Mm) -> f64 {
+        width.get() * depth.get().powi(3) / 12.0 / MM_PER_M.powi(4)
+    }
+
+    /// θ1 and θ2 of the design, eqs. (14) and (15), with the conveying speed
+    /// as it pulsates.
+    pub fn screw(&self, pulsation: Pulsation) -> Result<Screw, ScrewError> {
+        let turns = match self.unit {
+            TurnUnit::RadPerS => self.speed.get() * TAU / 60.0,
+            TurnUnit::RevPerS => self.speed.get() / 60.0,
+        };
+        let channel = positive("channel_m4", self.channel_m4)?;
+        let density = positive("density_kg_per_m3", self.density_kg_per_m3)?;
+        Screw::new(Screw {
+            theta1_m_per_s: self.pitch.get() / MM_PER_M * turns,
+            theta2_per_m: positive("nozzle_m3", self.nozzle_m3)? / (channel * density),
+            length_m: self.length.get() / MM_PER_M,
+            pulsation,
+            conveying: Conveying::AtPresentSpeed,
+        })
+    }
+}
+
+/// How the conveying speed pulsates about its mean: c = θ1·(1 + ε·cos(ωt + φ)),
+/// eq. (17).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Pulsation {
+    /// Share of the mean ε, from 0 up to but not 1.
+    pub share: f64,
+    /// Angular frequency ω \[rad/s\].
+    pub rad_per_s: f64,
+    /// Phase at the start of the run φ \[rad\]; 0 in the paper.
+    pub phase_rad: f64,
+}
+
+/// What the delay is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Conveying {
+    /// (L − x)/c(t): all of the way at the speed of the moment of arrival, as
+    /// the paper has it, eq. (16).
+    AtPresentSpeed,
+    /// The time since which the speed has added up to the way: what a belt
+    /// does. The same where the speed is constant.
+    AtSpeedOnTheWay,
+}
+
+/// The model's parameters, in metres and seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Screw {
+    /// Mean conveying speed θ1 \[m/s\].
+    pub theta1_m_per_s: f64,
+    /// How much easier melt leaves through the nozzle than it flows back, θ2
+    /// \[1/m\].
+    pub theta2_per_m: f64,
+    /// From the nozzle to the feed, L \[m\].
+    pub length_m: f64,
+    /// How the conveying speed changes.
+    pub pulsation: Pulsation,
+    /// What the delay is made of.
+    pub conveying: Conveying,
+}
+
+impl Screw {
+    /// The parameters, if a screw can have them.
+    pub fn new(screw: Self) -> Result<Self, ScrewError> {
+        positive("theta1_m_per_s", screw.theta1_m_per_s)?;
+        positive("theta2_per_m", screw.theta2_per_m)?;
+        positive("length_m", screw.length_m)?;
+        let Pulsation { share, rad_per_s, phase_rad } = screw.pulsation;
+        if !(0.0..1.0).contains(&share) {
+            return Err(ScrewError::Share { share });
+        }
+        if !(rad_per_s.is_finite() && rad_per_s >= 0.0 && phase_rad.is_finite()) {
+            return Err(ScrewError::Frequency { rad_per_s, phase_rad });
+        }
+        Ok(screw)
+    }
+
+    /// The same screw as one who does not know of the pulsation sees it,
+    /// eqs. (102) to (104).
+    pub fn steady(self) -> Self {
+        Self { pulsation: Pulsation::default(), ..self }
+    }
+
+    /// Whether the conveying speed changes at all.
+    pub fn pulsates(&self) -> bool {
+        self.pulsation.share > 0.0 && self.pulsation.rad_per_s > 0.0
+    }
+
+    /// Conveying speed at a moment, c(t) \[m/s\], eq. (17).
+    pub fn speed(&self, at_s: f64) -> f64 {
+        let Pulsation { share, rad_per_s, phase_rad } = self.pulsation;
+        self.theta1_m_per_s * (1.0 + share * libm::cos(rad_per_s * at_s + phase_rad))
+    }
+
+    /// Slowest conveying speed \[m/s\].
+    pub fn slowest(&self) -> f64 {
+        self.theta1_m_per_s * (1.0 - self.pulsation.share)
+    }
+
+    /// Way that is conveyed from the start of the run to a moment, ∫c \[m\].
+    pub fn way(&self, at_s: f64) -> f64 {
+        let Pulsation { share, rad_per_s, phase_rad } = self.pulsation;
+        let swing = if rad_per_s > 0.0 {
+            (libm::sin(rad_per_s * at_s + phase_rad) - libm::sin(phase_rad)) / rad_per_s
+        } else {
+            at_s * libm::cos(phase_rad)
+        };
+        self.theta1_m_per_s * (at_s + share * swing)
+    }
+
+    /// Share of full that holds the plug at a length \[m\], v(x), eq. (19).
+    pub fn holding(&self, plug_m: f64) -> f64 {
+        let lead = self.theta2_per_m * plug_m;
+        lead / (1.0 + lead)
+    }
+
+    /// Growth of the plug for each metre that is conveyed, −Γ(x, U), eq. (73).
+    pub fn growth(&self, plug_m: f64, fill: f64) -> f64 {
+        (fill - self.holding(plug_m)) / (1.0 - fill)
+    }
+
+    /// Delay of what arrives at a moment (16) \[s\].
+    pub fn delay(&self, at_s: f64, plug_m: f64) -> f64 {
+        let way = self.length_m - plug_m;
+        match self.conveying {
+            Conveying::AtPresentSpeed => way / self.speed(at_s),
+            Conveying::AtSpeedOnTheWay => at_s - self.moment(self.way(at_s) - way, at_s),
+        }
+    }
+
+    /// Longest delay that the screw can have \[s\].
+    pub fn longest_delay(&self) -> f64 {
+        self.length_m / self.slowest()
+    }
+
+    /// When the way conveyed since the start came to `way_m` \[s\], by Newton's
+    /// method within the two moments between which it must lie. `near_s` is a
+    /// moment to start from.
+    pub fn moment(&self, way_m: f64, near_s: f64) -> f64 {
+        let reach = (way_m - self.way(near_s)) / self.theta1_m_per_s;
+        let Pulsation { share, .. } = self.pulsation;
+        let (slow, fast) = (near_s + reach / (1.0 - share), near_s + reach / (1.0 + share));
+        let (mut low, mut high) = (slow.min(fast), slow.max(fast));
+        let mut at = near_s + reach;
+        for _ in 0..60 {
+            let miss = self.way(at) - way_m;
+            if miss > 0.0 {
+                high = high.min(at);
+            } else {
+                low = low.max(at);
+            }
+            let newton = at - miss / self.speed(at);
+            let next =
+                if newton >= low && newton <= high { newton } else { f64::midpoint(low, high) };
+            if (next - at).abs() <= 1e-15 * at.abs().max(1.0) {
+                return next;
+            }
+            at = next;
+        }
+        at
+    }
+
+    /// When what is fed at a moment first reaches a plug that stays as it is
+    /// \[s\]: σ0, the first effect of a control that begins then, eq. (53).
+    pub fn arrival(&self, fed_s: f64, plug_m: f64) -> f64 {
+        let way = self.length_m - plug_m;
+        if self.conveying == Conveying::AtSpeedOnTheWay || !self.pulsates() {
+            return self.moment(self.way(fed_s) + way, fed_s);
+        }
+        let late = |at: f64| at - self.delay(at, plug_m) - fed_s;
+        let (from, to) = (way / (2.0 * self.theta1_m_per_s), way / self.slowest());
+        let step = (to - from) / (8.0 + 16.0 * self.pulsation.rad_per_s * (to - from)).ceil();
+        let (mut low, mut high) = (fed_s + from, fed_s + to);
+        let mut at = low;
+        while at < high && late(at) < 0.0 {
+            low = at;
+            at += step;
+        }
+        high = high.min(at);
+        for _ in 0..80 {
+            let middle = f64::midpoint(low, high);
+            if late(middle) < 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        f64::midpoint(low, high)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const B: Pulsation = Pulsation { share: 0.4, rad_per_s: 0.4, phase_rad: 0.0 };
+
+    fn screw(pulsation: Pulsation) -> Screw {
+        ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap()
+    }
+
+    #[test]
+    fn both_readings_of_the_screw_speed_and_the_nozzles_ratio_come_out() {
+        let screw = screw(Pulsation::default());
+        assert!((screw.theta1_m_per_s - 0.094_247_779_6).abs() < 1e-10);
+        assert!((screw.theta2_per_m - 2.114_292_6).abs() < 1e-7);
+        let turns = ScrewDesign { unit: TurnUnit::RevPerS, ..ScrewDesign::DIAGNE_2015 };
+        assert!((turns.screw(B).unwrap().theta1_m_per_s - 0.015).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_channels_pressure_flow_comes_from_its_width_and_depth() {
+        let b = ScrewDesign::channel_m4(Mm::constant(8.0), Mm::constant(2.0));
+        assert!((b - 8e-3 * 8e-9 / 12.0).abs() < 1e-24);
+    }
+
+    #[test]
+    fn the_holding_share_holds_and_more_makes_the_plug_grow() {
+        let screw = screw(B);
+        let hold = screw.holding(0.16);
+        assert!((hold - 0.252_78).abs() < 1e-5);
+        assert!(screw.growth(0.16, hold).abs() < 1e-15);
+        assert!(screw.growth(0.16, 0.9) > 0.0);
+        // Eq. (13) as it is printed.
+        let (x, u) = (0.1, 0.6);
+        let lead = screw.theta2_per_m * x;
+        let printed = -lead / ((1.0 + lead) * (1.0 - u)) + u / (1.0 - u);
+        assert!((screw.growth(x, u) - printed).abs() < 1e-14);
+    }
+
+    #[test]
+    fn the_way_is_the_integral_of_the_speed_and_its_moment_leads_back() {
+        let screw = screw(Pulsation { phase_rad: 0.7, ..B });
+        let mut sum = 0.0;
+        for k in 0..40_000 {
+            sum += screw.speed((f64::from(k) + 0.5) * 1e-4) * 1e-4;
+        }
+        assert!((screw.way(4.0) - sum).abs() < 1e-9);
+        for near in [0.0, 3.9, 20.0] {
+            assert!((screw.moment(screw.way(4.0), near) - 4.0).abs() < 1e-12, "{near}");
+        }
+    }
+
+    #[test]
+    fn the_first_effect_of_a_control_comes_when_published_numbers_say() {
+        let none = screw(Pulsation::default()).arrival(0.0, 0.1);
+        assert!((none - 0.1 / 0.094_247_779_6).abs() < 1e-9);
+        let a = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
+        assert!((screw(a).arrival(0.0, 0.1) - 1.137).abs() < 5e-4);
+        assert!((screw(B).arrival(0.0, 0.1) - 0.768).abs() < 5e-4);
+    }
+
+    #[test]
+    fn a_delay_that_adds_up_on_the_way_is_the_paper_s_where_the_speed_is_steady() {
+        let belt = Conveying::AtSpeedOnTheWay;
+        let steady = Screw { conveying: belt, ..screw(Pulsation::default()) };
+        assert!((steady.delay(5.0, 0.1) - 0.1 / 0.094_247_779_6).abs() < 1e-9);
+        let waving = Screw { conveying: belt, ..screw(B) };
+        let delay = waving.delay(5.0, 0.1);
+        assert!((waving.way(5.0) - waving.way(5.0 - delay) - 0.1).abs() < 1e-12);
+        let arrival = waving.arrival(5.0 - delay, 0.1);
+        assert!((arrival - 5.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn parameters_that_no_screw_has_are_named() {
+        let design = ScrewDesign::DIAGNE_2015;
+        let empty = ScrewDesign { density_kg_per_m3: 0.0, ..design };
+        let said = empty.screw(B).unwrap_err().to_string();
+        assert_eq!(said, "density_kg_per_m3 is 0, which must be a positive number");
+        let still = ScrewDesign { speed: Rpm::ZERO, ..design };
+        assert!(matches!(
+            still.screw(B),
+            Err(ScrewError::NotPositive { name: "theta1_m_per_s", .. })
+        ));
+        let nan = ScrewDesign { nozzle_m3: f64::NAN, ..design };
+        assert!(matches!(nan.screw(B), Err(ScrewError::NotPositive { name: "nozzle_m3", .. })));
+        for share in [1.0, -0.1, f64::NAN] {
+            let pulsation = Pulsation { share, ..B };
+            assert!(matches!(design.screw(pulsation), Err(ScrewError::Share { .. })), "{share}");
+        }
+        for rad_per_s in [f64::INFINITY, -1.0] {
+            let pulsation = Pulsation { rad_per_s, ..B };
+            assert!(matches!(design.screw(pulsation), Err(ScrewError::Frequency { .. })));
+        }
+    }
+}
