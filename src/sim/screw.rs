@@ -1,0 +1,279 @@
+//! A screw that fills and empties: the plant of Diagne et al. 2015, eqs. (13),
+//! (16) and (17), with all that is on its way from the feed to the plug.
+
+use crate::extruder::screw::history::History;
+use crate::extruder::screw::{Conveying, Screw};
+
+/// How the plant is integrated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Integrator {
+    /// The paper's: one Euler step, the delay taken up to whole steps, so that
+    /// nothing arrives before its delay is over.
+    Euler,
+    /// Fourth order in steps of at most this length \[s\], which end where a
+    /// change of the feed reaches the plug.
+    RungeKutta(f64),
+}
+
+/// The plant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScrewPlant {
+    screw: Screw,
+    integrator: Integrator,
+    step_s: f64,
+    ticks: u32,
+    plug_m: f64,
+    feed: History,
+}
+
+impl ScrewPlant {
+    /// A plant that has been fed `before` until now, with feed and plug on a
+    /// grid of `step_s`.
+    pub fn new(
+        screw: Screw,
+        integrator: Integrator,
+        step_s: f64,
+        plug_m: f64,
+        before: f64,
+    ) -> Self {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+        let room = (screw.longest_delay() / step_s).ceil() as usize + 4;
+        let feed = History::new(room, before);
+        Self { screw, integrator, step_s, ticks: 0, plug_m, feed }
+    }
+
+    /// Time since the start \[s\].
+    pub fn now_s(&self) -> f64 {
+        f64::from(self.ticks) * self.step_s
+    }
+
+    /// Length of the plug \[m\].
+    pub fn plug_m(&self) -> f64 {
+        self.plug_m
+    }
+
+    /// Delay of what reaches the plug now \[s\].
+    pub fn delay_s(&self) -> f64 {
+        self.screw.delay(self.now_s(), self.plug_m)
+    }
+
+    /// Feeds a share of full over one step.
+    pub fn advance(&mut self, fill: f64) {
+        let from = self.now_s();
+        self.feed.push(self.fed_at(from), fill);
+        let to = f64::from(self.ticks + 1) * self.step_s;
+        match self.integrator {
+            Integrator::Euler => self.euler(from),
+            Integrator::RungeKutta(longest) => self.runge_kutta(from, to, longest),
+        }
+        self.plug_m = self.plug_m.clamp(0.0, self.screw.length_m);
+        self.ticks += 1;
+    }
+
+    fn euler(&mut self, from: f64) {
+        let steps = (self.screw.delay(from, self.plug_m) / self.step_s).ceil();
+        // The middle of the step that the feed is of, so that no rounding of
+        // its ends matters.
+        let place = self.fed_at(from - (steps - 0.5) * self.step_s);
+        self.plug_m += self.step_s * self.rate(from, self.plug_m, self.feed.at(place));
+    }
+
+    fn runge_kutta(&mut self, from: f64, to: f64, longest: f64) {
+        let mut at = from;
+        while at < to {
+            let place = self.reaching(at, self.plug_m);
+            let (fill, change) = (self.feed.at(place), self.feed.next_change(place));
+            let full = longest.min(to - at);
+            let mut step = full;
+            if let Some(change) = change {
+                let past =
+                    |step: f64| self.reaching(at + step, self.grown(at, step, fill)) - change;
+                if past(full) > 0.0 {
+                    step = crossing(past, full);
+                }
+            }
+            self.plug_m = self.grown(at, step, fill);
+            at = if to - at - step < 1e-13 { to } else { at + step };
+        }
+    }
+
+    /// The plug a step later under a feed that is held.
+    fn grown(&self, at: f64, step: f64, fill: f64) -> f64 {
+        let (x, half) = (self.plug_m, 0.5 * step);
+        let first = self.rate(at, x, fill);
+        let second = self.rate(at + half, x + half * first, fill);
+        let third = self.rate(at + half, x + half * second, fill);
+        let fourth = self.rate(at + step, x + step * third, fill);
+        x + step / 6.0 * (first + 2.0 * (second + third) + fourth)
+    }
+
+    fn rate(&self, at: f64, plug: f64, fill: f64) -> f64 {
+        self.screw.speed(at) * self.screw.growth(plug, fill)
+    }
+
+    /// Where in the feed's row that is what reaches the plug now.
+    fn reaching(&self, at: f64, plug: f64) -> f64 {
+        match self.screw.conveying {
+            Conveying::AtPresentSpeed => at - (self.screw.length_m - plug) / self.screw.speed(at),
+            Conveying::AtSpeedOnTheWay => self.screw.way(at) - (self.screw.length_m - plug),
+        }
+    }
+
+    /// Where in the feed's row that is what is fed now.
+    fn fed_at(&self, at: f64) -> f64 {
+        match self.screw.conveying {
+            Conveying::AtPresentSpeed => at,
+            Conveying::AtSpeedOnTheWay => self.screw.way(at),
+        }
+    }
+}
+
+/// Just beyond where a growing function changes its sign within a step.
+fn crossing(past: impl Fn(f64) -> f64, full: f64) -> f64 {
+    let (mut low, mut high) = (0.0, full);
+    for _ in 0..40 {
+        let middle = f64::midpoint(low, high);
+        if past(middle) > 0.0 {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    high
+}
+
+/// The same screw without delay under a law that is held nowhere, from a plug
+/// at a moment on: what a loop with a perfect predictor equals from the first
+/// effect of its control. Lengths of the plug \[m\] `step_s` apart, by
+/// Runge–Kutta steps of a tenth of that.
+pub fn delay_free(
+    screw: &Screw,
+    (plug_m, from_s): (f64, f64),
+    step_s: f64,
+    law: impl Fn(f64) -> f64,
+) -> impl Iterator<Item = f64> {
+    const PARTS: u32 = 10;
+    let rate = move |at: f64, plug: f64| screw.speed(at) * screw.growth(plug, law(plug));
+    let step = step_s / f64::from(PARTS);
+    let half = 0.5 * step;
+    let mut plug = plug_m;
+    (0_u32..).map(move |tick| {
+        let now = plug;
+        for part in 0..PARTS {
+            let at = from_s + step_s * f64::from(tick) + step * f64::from(part);
+            let first = rate(at, plug);
+            let second = rate(at + half, plug + half * first);
+            let third = rate(at + half, plug + half * second);
+            let fourth = rate(at + step, plug + step * third);
+            plug += step / 6.0 * (first + 2.0 * (second + third) + fourth);
+        }
+        now
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::extruder::screw::exact::Exact;
+    use crate::extruder::screw::{Pulsation, ScrewDesign};
+
+    const A: Pulsation = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
+    const B: Pulsation = Pulsation { share: 0.4, rad_per_s: 0.4, phase_rad: 0.0 };
+
+    fn screw(pulsation: Pulsation) -> Screw {
+        ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap()
+    }
+
+    /// A feed that neither law would give.
+    fn fill(tick: u32) -> f64 {
+        0.35 + 0.3 * (0.011 * f64::from(tick)).sin() + if tick % 400 < 200 { 0.1 } else { 0.0 }
+    }
+
+    #[test]
+    fn a_plug_that_is_held_stays() {
+        for integrator in [Integrator::Euler, Integrator::RungeKutta(1e-3)] {
+            let screw = screw(A);
+            let mut plant = ScrewPlant::new(screw, integrator, 1e-3, 0.13, screw.holding(0.13));
+            for _ in 0..5_000 {
+                plant.advance(screw.holding(0.13));
+            }
+            assert!((plant.plug_m() - 0.13).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn nothing_happens_before_the_first_effect() {
+        for integrator in [Integrator::Euler, Integrator::RungeKutta(1e-3)] {
+            let screw = screw(B);
+            let mut plant = ScrewPlant::new(screw, integrator, 1e-3, 0.1, screw.holding(0.1));
+            while (plant.plug_m() - 0.1).abs() < 1e-9 {
+                plant.advance(0.9);
+            }
+            let first = screw.arrival(0.0, 0.1);
+            assert!((plant.now_s() - first).abs() < 2.1e-3, "{}", plant.now_s());
+        }
+    }
+
+    #[test]
+    fn material_is_conserved_on_a_belt() {
+        // What was fed is in the channel or has left through the nozzle: with
+        // q for the way conveyed, d(plug + ∫fill ahead of it) = U − θ2·x/(1 + θ2·x) a metre.
+        let screw = Screw { conveying: Conveying::AtSpeedOnTheWay, ..screw(A) };
+        let before = screw.holding(0.1);
+        let mut plant = ScrewPlant::new(screw, Integrator::RungeKutta(2e-4), 1e-3, 0.1, before);
+        let (mut stored, mut passed) = (0.1 + 0.1 * before, 0.0);
+        for tick in 0..3_000 {
+            let way = screw.way(plant.now_s() + 1e-3) - screw.way(plant.now_s());
+            let leaves = screw.holding(plant.plug_m());
+            plant.advance(fill(tick));
+            let leaves = f64::midpoint(leaves, screw.holding(plant.plug_m()));
+            passed += way * (fill(tick) - leaves);
+        }
+        let now = screw.way(plant.now_s());
+        let ahead: f64 = plant
+            .feed
+            .pieces(now - (screw.length_m - plant.plug_m()), now)
+            .map(|piece| piece.length * piece.fill)
+            .sum();
+        stored -= plant.plug_m() + ahead;
+        assert!((stored + passed).abs() < 1e-6, "{stored} {passed}");
+    }
+
+    #[test]
+    fn a_prediction_comes_true() {
+        for conveying in [Conveying::AtPresentSpeed, Conveying::AtSpeedOnTheWay] {
+            for pulsation in [Pulsation::default(), A, B] {
+                let screw = Screw { conveying, ..screw(pulsation) };
+                let predictor = Exact::new(screw);
+                let mut plant =
+                    ScrewPlant::new(screw, Integrator::RungeKutta(2e-4), 1e-3, 0.1, 0.2);
+                let mut history = History::new(4_000, 0.2);
+                let mut due = Vec::new();
+                for tick in 0..4_000 {
+                    let now = plant.now_s();
+                    if tick % 100 == 7 {
+                        due.push(predictor.predict(&history, now, plant.plug_m()).unwrap());
+                    }
+                    history.push(predictor.place(now), fill(tick));
+                    let was = plant.plug_m();
+                    plant.advance(fill(tick));
+                    due.retain(|found| {
+                        let here = plant.now_s() - found.arrival_s;
+                        let plug = plant.plug_m() + (was - plant.plug_m()) * here / 1e-3;
+                        assert!(here < 0.0 || (plug - found.plug_m).abs() < 2e-6, "{here}");
+                        here < 0.0
+                    });
+                }
+                assert!(due.len() < 30);
+            }
+        }
+    }
+
+    #[test]
+    fn without_delay_the_plug_goes_where_the_share_holds_it() {
+        let screw = screw(B);
+        let hold = screw.holding(0.16);
+        let last = delay_free(&screw, (0.1, 0.0), 0.1, |_| hold).nth(900).unwrap();
+        assert!((last - 0.16).abs() < 1e-6);
+    }
+}
