@@ -11,6 +11,7 @@
 pub mod adaptive;
 pub mod demand;
 pub mod drive;
+pub mod feedforward;
 pub mod law;
 pub mod limits;
 pub mod rates;

@@ -74,7 +74,7 @@ pub(super) fn split(dead_time_s: f64, dt_s: f64) -> Result<(usize, f64), ModelEr
 
 /// A model that is given one sample after the other. A step allocates nothing
 /// and takes well below a microsecond for a few poles.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Simulator {
     order: usize,
     /// Φ, row by row.

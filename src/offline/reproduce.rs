@@ -10,10 +10,14 @@ use super::report::series::Series;
 use super::report::whole_page;
 use crate::config::Problems;
 use crate::extruder::adaptive::SubSystemError;
+use crate::extruder::feedforward::FeedforwardError;
+use crate::model::ModelError;
+use crate::sim::bcs_thesis::fit_table::FitTableError;
 use crate::sim::cell::SimError;
 use crate::sim::render::RenderError;
 
 pub mod barjuei2022;
+pub mod bcs_thesis;
 pub mod looey2026;
 pub mod table;
 
@@ -43,6 +47,8 @@ pub struct Row {
 pub enum Source {
     /// Shojaei Barjuei et al. 2022: width by robot speed.
     Barjuei2022,
+    /// Bead characterisation thesis: models of the extruder, and speed by flow.
+    BcsThesis,
     /// Mohammadi Looey et al. 2026: adaptive law of nozzle and plate.
     Looey2026,
 }
@@ -75,6 +81,15 @@ pub enum ReproduceError {
     /// An adaptive law cannot be set up.
     #[error(transparent)]
     Adaptive(#[from] SubSystemError),
+    /// A feedforward cannot be set up.
+    #[error(transparent)]
+    Feedforward(#[from] FeedforwardError),
+    /// A table of fits cannot be made.
+    #[error(transparent)]
+    FitTable(#[from] FitTableError),
+    /// A model cannot be.
+    #[error(transparent)]
+    Model(#[from] ModelError),
 }
 
 /// What a source came to.
@@ -103,12 +118,13 @@ pub struct Section {
 
 impl Source {
     /// All of them, in the order of the page.
-    pub const ALL: [Self; 2] = [Self::Barjuei2022, Self::Looey2026];
+    pub const ALL: [Self; 3] = [Self::Barjuei2022, Self::BcsThesis, Self::Looey2026];
 
     /// The name that `reproduce.json` and the command line have.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Barjuei2022 => "barjuei2022",
+            Self::BcsThesis => "bcs-thesis",
             Self::Looey2026 => "looey2026",
         }
     }
@@ -117,6 +133,7 @@ impl Source {
     pub const fn about(self) -> &'static str {
         match self {
             Self::Barjuei2022 => "Shojaei Barjuei et al. 2022: width by robot speed",
+            Self::BcsThesis => "bead characterisation thesis: extruder models, speed by flow",
             Self::Looey2026 => "Mohammadi Looey et al. 2026: adaptive law of nozzle and plate",
         }
     }
@@ -125,6 +142,7 @@ impl Source {
     pub const fn experiments(self) -> u64 {
         match self {
             Self::Barjuei2022 => barjuei2022::EXPERIMENTS,
+            Self::BcsThesis => bcs_thesis::EXPERIMENTS,
             Self::Looey2026 => looey2026::EXPERIMENTS,
         }
     }
@@ -137,6 +155,7 @@ impl Source {
     ) -> Result<Reproduced, ReproduceError> {
         match self {
             Self::Barjuei2022 => barjuei2022::run(effort, progress),
+            Self::BcsThesis => bcs_thesis::run(effort, progress),
             Self::Looey2026 => looey2026::run(effort, progress),
         }
     }

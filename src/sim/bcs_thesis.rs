@@ -1,7 +1,9 @@
 //! The experiments of the bead characterisation thesis: an extruder driven by a
 //! voltage lays a bead on a wheel. The plant as its chapter 3 gives it.
 
+pub mod bounds;
 pub mod fit_table;
+pub mod on_off;
 
 use crate::model::{ModelError, TransferFunction};
 

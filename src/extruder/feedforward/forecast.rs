@@ -1,0 +1,97 @@
+//! The flow at the nozzle from what the extruder is told, or from its measured
+//! speed.
+
+use super::{FeedforwardError, positive};
+use crate::model::{Between, Simulator, TransferFunction};
+use crate::time::Span;
+use crate::units::{Mm3PerS, Rpm};
+
+/// What an extruder does with its command.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtruderModel {
+    /// G1: turns of the screw \[rpm\] over the command, as the drive's voltage
+    /// \[V\]. With a command in rpm and a fast drive it is a gain of 1.
+    pub drive: TransferFunction,
+    /// G2: flow at the nozzle \[mm³/s\] over turns of the screw \[rpm\].
+    pub flow: TransferFunction,
+}
+
+/// Whether the screw's measured speed takes part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ScrewSpeed {
+    /// There is no encoder: the drive's model says it.
+    Modelled,
+    /// The encoder's in place of the drive's model (thesis, section 5.3.1);
+    /// what lies ahead comes from the model as a change from now.
+    Measured,
+}
+
+/// The flow now, and as far ahead as is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlowForecast {
+    /// The drive ahead, and now.
+    drives: [Simulator; 2],
+    flow: Simulator,
+    screw: ScrewSpeed,
+    ahead_s: f64,
+}
+
+impl FlowForecast {
+    /// A forecast for `ahead` of now on a grid of `period`. What is told now
+    /// shows after the dead times, so that no forecast can reach further; it
+    /// fails there, and where a model is not stable.
+    pub fn new(
+        model: &ExtruderModel,
+        screw: ScrewSpeed,
+        ahead: Span,
+        period: Span,
+    ) -> Result<Self, FeedforwardError> {
+        let period_s = positive("the period", period.secs())?;
+        let ahead_s = ahead.secs();
+        super::usable_gain(&model.drive)?;
+        super::usable_gain(&model.flow)?;
+        let dead_time_s = model.drive.dead_time_s() + model.flow.dead_time_s();
+        if !(0.0..=dead_time_s).contains(&ahead_s) {
+            return Err(FeedforwardError::TooFarAhead { ahead_s, dead_time_s });
+        }
+        let from_drive = ahead_s.min(model.drive.dead_time_s());
+        let from_flow = ahead_s - from_drive;
+        let drive = |earlier: f64| {
+            let tf = model.drive.with_dead_time(model.drive.dead_time_s() - earlier)?;
+            Simulator::new(&tf, period_s, Between::Held)
+        };
+        let flow = model.flow.with_dead_time(model.flow.dead_time_s() - from_flow)?;
+        let flow = Simulator::new(&flow, period_s, Between::Linear)?;
+        Ok(Self { drives: [drive(from_drive)?, drive(0.0)?], flow, screw, ahead_s })
+    }
+
+    /// Takes up the steady state of a command.
+    pub fn start(&mut self, command: f64) -> Result<(), FeedforwardError> {
+        for drive in &mut self.drives {
+            drive.settle(command)?;
+        }
+        // The probes leave the states where they are: a steady state stays.
+        let rpm = self.drives[1].step(command);
+        let _ = self.drives[0].step(command);
+        self.flow.settle(rpm)?;
+        Ok(())
+    }
+
+    /// One period with the command that is applied from now on and the screw's
+    /// speed as it is measured now, if it is. The flow [`Self::ahead_s`] from
+    /// now.
+    pub fn step(&mut self, command: f64, measured: Option<Rpm>) -> Mm3PerS {
+        let [ahead, now] = &mut self.drives;
+        let (ahead, now) = (ahead.step(command), now.step(command));
+        let rpm = match (self.screw, measured) {
+            (ScrewSpeed::Measured, Some(measured)) => measured.get() + ahead - now,
+            _ => ahead,
+        };
+        Mm3PerS::new(self.flow.step(rpm)).unwrap_or_default()
+    }
+
+    /// How far ahead of now its flow is \[s\].
+    pub fn ahead_s(&self) -> f64 {
+        self.ahead_s
+    }
+}
