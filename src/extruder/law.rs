@@ -2,10 +2,14 @@
 //! nozzle and what the extruder reports go in, a command comes out.
 
 mod adaptive;
+mod feedforward;
 mod played;
+mod screw;
 
 pub use adaptive::{AdaptiveNozzle, NozzleModel};
+pub use feedforward::{Foreseen, OperatingPoint};
 pub use played::{Constant, Played};
+pub use screw::ScrewFill;
 
 use super::report::ExtruderReport;
 use crate::time::{Span, Stamp};
@@ -51,6 +55,10 @@ impl Wish {
     }
 }
 
+/// A reading that cannot be true, such as a screw filled beyond its length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Unusable;
+
 /// What every law can do. None of it allocates.
 pub trait Strategy {
     /// The readings that it needs.
@@ -67,8 +75,9 @@ pub trait Strategy {
 
     /// The part that runs at the rate of the control, `dt` after the last time
     /// (zero at the first). The report is not older than the supervisor allows
-    /// and has what [`Self::needs`] names.
-    fn answer(&mut self, now: Stamp, dt: Span, report: &ExtruderReport);
+    /// and has what [`Self::needs`] names. Fails where it cannot be true; then
+    /// the wish stays as it is.
+    fn answer(&mut self, now: Stamp, dt: Span, report: &ExtruderReport) -> Result<(), Unusable>;
 
     /// What it would like now.
     fn wish(&self) -> Wish;
@@ -85,6 +94,10 @@ pub enum Law {
     Constant(Constant),
     /// Commands that were written down beforehand, for an experiment.
     Profile(Played),
+    /// The inverse of a model.
+    Feedforward(Foreseen),
+    /// The filled length of a screw, foretold over its delay.
+    Screw(ScrewFill),
     /// Model-reference adaptive control of the speed in the nozzle.
     Adaptive(AdaptiveNozzle),
 }
@@ -95,6 +108,8 @@ impl Law {
         match self {
             Self::Constant(law) => law,
             Self::Profile(law) => law,
+            Self::Feedforward(law) => law,
+            Self::Screw(law) => law,
             Self::Adaptive(law) => law,
         }
     }
@@ -104,6 +119,8 @@ impl Law {
         match self {
             Self::Constant(law) => law,
             Self::Profile(law) => law,
+            Self::Feedforward(law) => law,
+            Self::Screw(law) => law,
             Self::Adaptive(law) => law,
         }
     }

@@ -14,6 +14,8 @@ pub enum ExtruderHold {
     /// No report for longer than the cell allows, or none with what the law
     /// needs.
     NoReading,
+    /// What is reported cannot be true.
+    BadReading,
     /// The screw does not turn as it was told.
     SpeedMismatch,
 }

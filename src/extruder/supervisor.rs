@@ -198,8 +198,10 @@ impl Supervisor {
             self.begin(now, flow);
         }
         self.lose_patience(now);
-        if self.phase == Phase::Running {
-            self.drive(now, dt, flow);
+        match self.phase {
+            Phase::Running => self.drive(now, dt, flow),
+            Phase::Holding { why: ExtruderHold::BadReading, .. } => self.ask_again(now),
+            _ => {}
         }
     }
 
@@ -219,19 +221,36 @@ impl Supervisor {
     }
 
     fn drive(&mut self, now: Stamp, dt: Span, flow: Mm3PerS) {
-        let law = self.setup.law.strategy_mut();
-        law.foresee(dt, flow);
-        if self.control.due(now)
-            && let Some((_, report)) = &self.report
-        {
-            let since = self.controlled.replace(now).map_or(Span::ZERO, |last| now - last);
-            law.answer(now, since, report);
+        self.setup.law.strategy_mut().foresee(dt, flow);
+        if !self.answer(now) {
+            self.hold(now, ExtruderHold::BadReading);
+            return;
         }
+        let law = self.setup.law.strategy_mut();
         let wish = law.wish();
         let (applied, limit) = self.setup.limits.apply(wish.value, self.applied, dt);
         law.settle(now, applied);
         self.applied = applied;
         self.note(wish, limit);
+    }
+
+    /// Lets the law answer the last report where that is due; false where the
+    /// report cannot be true.
+    fn answer(&mut self, now: Stamp) -> bool {
+        let Some((_, report)) = self.report else { return true };
+        if !self.control.due(now) {
+            return true;
+        }
+        let since = self.controlled.replace(now).map_or(Span::ZERO, |last| now - last);
+        self.setup.law.strategy_mut().answer(now, since, &report).is_ok()
+    }
+
+    /// Whether reports have become usable again.
+    fn ask_again(&mut self, now: Stamp) {
+        let before = self.controlled;
+        if self.answer(now) && self.controlled != before {
+            self.phase = Phase::Running;
+        }
     }
 
     fn note(&mut self, wish: Wish, limit: CommandLimit) {

@@ -46,6 +46,7 @@ pub const fn extruder_hold(hold: ExtruderHold) -> &'static str {
     match hold {
         ExtruderHold::LinkDown => "link_down",
         ExtruderHold::NoReading => "no_reading",
+        ExtruderHold::BadReading => "bad_reading",
         ExtruderHold::SpeedMismatch => "speed_mismatch",
     }
 }

@@ -3,7 +3,7 @@
 //! Mohammadi Looey et al. 2026, eq. (8); the strand's sub-system commands the
 //! plate, which is the robot's side.
 
-use super::{Need, Strategy, Wish};
+use super::{Need, Strategy, Unusable, Wish};
 use crate::extruder::adaptive::{FirstOrder, Law as Adaptive};
 use crate::extruder::report::ExtruderReport;
 use crate::time::{Span, Stamp};
@@ -69,8 +69,8 @@ impl Strategy for AdaptiveNozzle {
         self.reference = self.law.reference_for(self.speed(flow));
     }
 
-    fn answer(&mut self, _now: Stamp, dt: Span, report: &ExtruderReport) {
-        let Some(flow) = report.flow_mm3_per_s else { return };
+    fn answer(&mut self, _now: Stamp, dt: Span, report: &ExtruderReport) -> Result<(), Unusable> {
+        let flow = report.flow_mm3_per_s.ok_or(Unusable)?;
         let (measured, known) = (self.speed(flow), self.nozzle.pressure_kg_per_s);
         if !self.begun {
             self.begun = true;
@@ -80,6 +80,7 @@ impl Strategy for AdaptiveNozzle {
         let feedforward = self.holding(action.model);
         self.wish =
             Wish { value: action.command, feedforward, feedback: action.command - feedforward };
+        Ok(())
     }
 
     fn wish(&self) -> Wish {
@@ -127,7 +128,7 @@ mod tests {
         let mut dt = Span::ZERO;
         while now.secs() < secs {
             law.foresee(dt, wanted);
-            law.answer(now, dt, &report(speed * 100.0 / M_PER_MM));
+            law.answer(now, dt, &report(speed * 100.0 / M_PER_MM)).unwrap();
             command = law.wish().value;
             law.settle(now, command);
             dt = Span::from_millis(50);

@@ -1,7 +1,7 @@
 //! Commands that answer nothing: one for all of a bead, or a profile that was
 //! written down beforehand.
 
-use super::{Strategy, Wish};
+use super::{Strategy, Unusable, Wish};
 use crate::extruder::report::ExtruderReport;
 use crate::identify::profile::Profile;
 use crate::time::{Span, Stamp};
@@ -18,7 +18,9 @@ impl Strategy for Constant {
 
     fn foresee(&mut self, _dt: Span, _flow: Mm3PerS) {}
 
-    fn answer(&mut self, _now: Stamp, _dt: Span, _report: &ExtruderReport) {}
+    fn answer(&mut self, _now: Stamp, _dt: Span, _report: &ExtruderReport) -> Result<(), Unusable> {
+        Ok(())
+    }
 
     fn wish(&self) -> Wish {
         Wish::known(self.0)
@@ -51,7 +53,9 @@ impl Strategy for Played {
         self.at_s += dt.max(Span::ZERO).secs();
     }
 
-    fn answer(&mut self, _now: Stamp, _dt: Span, _report: &ExtruderReport) {}
+    fn answer(&mut self, _now: Stamp, _dt: Span, _report: &ExtruderReport) -> Result<(), Unusable> {
+        Ok(())
+    }
 
     fn wish(&self) -> Wish {
         Wish::known(self.profile.at(self.at_s))

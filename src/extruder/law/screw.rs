@@ -1,0 +1,58 @@
+//! The predictor of the screw behind the face of a strategy: the filled length
+//! is brought to its setpoint and held there by what is fed. Diagne et al.
+//! 2015, eq. (74).
+
+use super::{Need, Strategy, Unusable, Wish};
+use crate::extruder::report::ExtruderReport;
+use crate::extruder::screw::control::ScrewSettings;
+use crate::extruder::screw::{ScrewControl, ScrewError};
+use crate::time::{Span, Stamp};
+use crate::units::Mm3PerS;
+
+/// The control of the screw. What flows hangs on the filled length alone, whose
+/// setpoint stands in the cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScrewFill {
+    control: ScrewControl,
+    hold: f64,
+    fill: f64,
+}
+
+impl ScrewFill {
+    /// Before its first bead. Fails for parameters that no screw has.
+    pub fn new(settings: &ScrewSettings) -> Result<Self, ScrewError> {
+        let control = ScrewControl::new(settings)?;
+        let hold = settings.law.hold();
+        Ok(Self { control, hold, fill: hold })
+    }
+}
+
+impl Strategy for ScrewFill {
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Filled]
+    }
+
+    fn begin(&mut self, _now: Stamp, _flow: Mm3PerS) -> Wish {
+        self.fill = self.hold;
+        self.wish()
+    }
+
+    fn foresee(&mut self, _dt: Span, _flow: Mm3PerS) {}
+
+    fn answer(&mut self, now: Stamp, _dt: Span, report: &ExtruderReport) -> Result<(), Unusable> {
+        let plug = report.filled_mm.ok_or(Unusable)?;
+        self.fill = self.control.step(now, plug).map_err(|_| Unusable)?.fill;
+        Ok(())
+    }
+
+    fn wish(&self) -> Wish {
+        Wish { value: self.fill, feedforward: self.hold, feedback: self.fill - self.hold }
+    }
+
+    fn settle(&mut self, now: Stamp, applied: f64) {
+        // What is on its way is what was fed, not what was wished for.
+        if (applied - self.control.fed()).abs() > f64::EPSILON {
+            let _ = self.control.applied(now, applied);
+        }
+    }
+}
