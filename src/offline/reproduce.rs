@@ -18,6 +18,7 @@ use crate::sim::render::RenderError;
 
 pub mod barjuei2022;
 pub mod bcs_thesis;
+pub mod diagne2015;
 pub mod looey2026;
 pub mod table;
 
@@ -49,6 +50,8 @@ pub enum Source {
     Barjuei2022,
     /// Bead characterisation thesis: models of the extruder, and speed by flow.
     BcsThesis,
+    /// Diagne et al. 2015: a screw with a delay that depends on time and state.
+    Diagne2015,
     /// Mohammadi Looey et al. 2026: adaptive law of nozzle and plate.
     Looey2026,
 }
@@ -78,6 +81,9 @@ pub enum ReproduceError {
     /// A picture cannot be rendered.
     #[error(transparent)]
     Render(#[from] RenderError),
+    /// A screw's run cannot be made.
+    #[error("the screw: {0}")]
+    Screw(#[from] crate::sim::diagne2015::run::RunError),
     /// An adaptive law cannot be set up.
     #[error(transparent)]
     Adaptive(#[from] SubSystemError),
@@ -118,13 +124,15 @@ pub struct Section {
 
 impl Source {
     /// All of them, in the order of the page.
-    pub const ALL: [Self; 3] = [Self::Barjuei2022, Self::BcsThesis, Self::Looey2026];
+    pub const ALL: [Self; 4] =
+        [Self::Barjuei2022, Self::BcsThesis, Self::Diagne2015, Self::Looey2026];
 
     /// The name that `reproduce.json` and the command line have.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Barjuei2022 => "barjuei2022",
             Self::BcsThesis => "bcs-thesis",
+            Self::Diagne2015 => "diagne2015",
             Self::Looey2026 => "looey2026",
         }
     }
@@ -134,6 +142,7 @@ impl Source {
         match self {
             Self::Barjuei2022 => "Shojaei Barjuei et al. 2022: width by robot speed",
             Self::BcsThesis => "bead characterisation thesis: extruder models, speed by flow",
+            Self::Diagne2015 => "Diagne et al. 2015: screw with a delay of time and state",
             Self::Looey2026 => "Mohammadi Looey et al. 2026: adaptive law of nozzle and plate",
         }
     }
@@ -143,6 +152,7 @@ impl Source {
         match self {
             Self::Barjuei2022 => barjuei2022::EXPERIMENTS,
             Self::BcsThesis => bcs_thesis::EXPERIMENTS,
+            Self::Diagne2015 => diagne2015::EXPERIMENTS,
             Self::Looey2026 => looey2026::EXPERIMENTS,
         }
     }
@@ -156,6 +166,7 @@ impl Source {
         match self {
             Self::Barjuei2022 => barjuei2022::run(effort, progress),
             Self::BcsThesis => bcs_thesis::run(effort, progress),
+            Self::Diagne2015 => diagne2015::run(progress),
             Self::Looey2026 => looey2026::run(effort, progress),
         }
     }
