@@ -2,7 +2,7 @@
 //! speed.
 
 use super::{FeedforwardError, positive};
-use crate::model::{Between, Simulator, TransferFunction};
+use crate::model::{Between, ModelError, Simulator, TransferFunction};
 use crate::time::Span;
 use crate::units::{Mm3PerS, Rpm};
 
@@ -14,6 +14,14 @@ pub struct ExtruderModel {
     pub drive: TransferFunction,
     /// G2: flow at the nozzle \[mm³/s\] over turns of the screw \[rpm\].
     pub flow: TransferFunction,
+}
+
+impl ExtruderModel {
+    /// From command to flow, for [`Inverse`](super::Inverse). Fails where the
+    /// numbers are too large to be multiplied.
+    pub fn whole(&self) -> Result<TransferFunction, ModelError> {
+        self.drive.series(&self.flow)
+    }
 }
 
 /// Whether the screw's measured speed takes part.

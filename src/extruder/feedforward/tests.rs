@@ -18,7 +18,7 @@ fn settings() -> InverseSettings {
 
 /// Voltage to flow of bcs-thesis: relative degree 1, dead time 54 ms.
 fn extruder() -> TransferFunction {
-    drive().series(&flow()).unwrap()
+    ExtruderModel { drive: drive(), flow: flow() }.whole().unwrap()
 }
 
 fn drive() -> TransferFunction {

@@ -23,8 +23,12 @@ pub const EXPERIMENTS: u64 = 6;
 const SEEDS: u64 = 10;
 /// Seeds of the table of fits.
 const FIT_SEEDS: u64 = 6;
+/// Fits beside the bounds of accuracy.
+const TRIALS: u64 = 100;
 /// Seeds of each distance of the camera.
 const CAMERA_SEEDS: u64 = 4;
+/// What is drawn once more, more closely \[s\].
+const CLOSER_S: (f64, f64) = (40.0, 60.0);
 /// Distances of the camera behind the nozzle \[mm\].
 const CAMERAS_MM: [f64; 6] = [1.0, 2.0, 4.0, 7.0, 10.0, 20.0];
 const PRESSURE: Sensors = Sensors { camera_mm: None, pressure: true, exponent: EXPONENT };
@@ -213,20 +217,21 @@ fn sensing(seeds: u64, rows: &mut Rows) -> Result<Section, ReproduceError> {
     })
 }
 
+/// The least errors that parameters can have, and those of our fits.
 fn accuracy_bounds(rows: &mut Rows) -> Result<(), ReproduceError> {
-    let case = "bound: step of 0.6, 10 s at 50 Hz";
-    for (bound, quantity) in
-        bounds::first_order()?.iter().zip(["least σ of K", "least σ of τ", "least σ of L"])
-    {
+    let case = "step of 0.6, 10 s at 50 Hz, least error and ours";
+    let names = ["σ of K", "σ of τ", "σ of L"];
+    for (bound, quantity) in bounds::first_order(TRIALS)?.iter().zip(names) {
         let (unit, scale) = if bound.name == "K" { ("1", 1.0) } else { ("ms", 1000.0) };
-        rows.push(case, (quantity, unit), [None, Some(bound.sigma * scale), None]);
+        let [least, ours] = [bound.sigma, bound.scatter].map(|sigma| Some(sigma * scale));
+        rows.push(case, (quantity, unit), [None, least, ours]);
     }
-    let case = "bound: G2, 60 s of PRBS, 17 % white noise";
-    let names =
-        ["least σ of a1", "least σ of a0", "least σ of b2", "least σ of b1", "least σ of b0"];
-    for (bound, quantity) in bounds::flow_model()?.iter().zip(names) {
-        let percent = 100.0 * bound.sigma / bound.value.abs();
-        rows.push(case, (quantity, "%"), [None, Some(percent), None]);
+    let case = "G2, 60 s of PRBS, 17 % white noise, least error and ours";
+    let names = ["σ of a1", "σ of a0", "σ of b2", "σ of b1", "σ of b0"];
+    for (bound, quantity) in bounds::flow_model(TRIALS)?.iter().zip(names) {
+        let percent = |sigma: f64| Some(100.0 * sigma / bound.value.abs());
+        let values = [None, percent(bound.sigma), percent(bound.scatter)];
+        rows.push(case, (quantity, "%"), values);
     }
     Ok(())
 }
@@ -338,9 +343,20 @@ fn draw_runs(thesis: &Compared, ours: &Compared) -> Markup {
             (of(best), "ours", palette::OURS),
         ]
     };
+    let near = |run: &Run| -> Vec<(f64, f64)> {
+        run.area.iter().copied().filter(|(t, _)| (CLOSER_S.0..=CLOSER_S.1).contains(t)).collect()
+    };
+    let (theirs, best_near) = (near(on), near(best));
+    let closer = [
+        (theirs.as_slice(), "the thesis' controller", palette::PAPER),
+        (best_near.as_slice(), "ours", palette::OURS),
+    ];
+    let closer_axis = XAxis::time(CLOSER_S);
+    let wanted = Some(plant::on_off::AREA_MM2);
     let flow = [(off.flow.as_slice(), "flow at the nozzle", palette::FLOW)];
     html! {
-        (plot("section [mm²]", &axis, &runs(|run| &run.area), Some(plant::on_off::AREA_MM2)))
+        (plot("section [mm²]", &axis, &runs(|run| &run.area), wanted))
+        (plot("section, looked at more closely [mm²]", &closer_axis, &closer, wanted))
         (plot("width [mm]", &axis, &runs(|run| &run.width), None))
         (plot("wheel's surface [mm/s]", &axis, &runs(|run| &run.speed), None))
         (plot("flow [mm³/s]", &axis, &flow, None))
@@ -350,14 +366,16 @@ fn draw_runs(thesis: &Compared, ours: &Compared) -> Markup {
 fn draw_exact([thesis, ours]: &[Compared; 2]) -> Markup {
     let of = |found: &Compared| -> Vec<(f64, f64)> {
         let [_, on] = &found.example;
-        on.area.iter().map(|(t, area)| (*t, area - plant::on_off::AREA_MM2)).collect()
+        let judged = on.area.iter().filter(|(t, _)| *t >= plant::on_off::JUDGED_FROM_S);
+        judged.map(|(t, area)| (*t, area - plant::on_off::AREA_MM2)).collect()
     };
     let (theirs, best) = (of(thesis), of(ours));
     let curves = [
         (theirs.as_slice(), "the thesis' controller", palette::PAPER),
         (best.as_slice(), "ours", palette::OURS),
     ];
-    plot("section − 45 [mm²]", &time(&thesis.example[0]), &curves, None)
+    let axis = XAxis::time((plant::on_off::JUDGED_FROM_S, time(&thesis.example[0]).range.1));
+    plot("section − 45 [mm²]", &axis, &curves, None)
 }
 
 fn time(run: &Run) -> XAxis {

@@ -28,7 +28,7 @@ const COMMAND_STEPS: u64 = 5;
 /// Length of a run \[s\].
 const LENGTH_S: f64 = 90.0;
 /// From when on the section is judged \[s\].
-const JUDGED_FROM_S: f64 = 15.0;
+pub const JUDGED_FROM_S: f64 = 15.0;
 /// Wanted section \[mm²\].
 pub const AREA_MM2: f64 = 45.0;
 /// Speed of the wheel's surface \[mm/s\] for each rpm: a diameter of
