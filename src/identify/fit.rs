@@ -44,6 +44,7 @@ pub use report::{Fit, Note, Parameter};
 pub use samples::{DataError, Samples};
 pub use settings::{Before, DeadTime, Level, Settings, Structure};
 
+use crate::model::Between;
 use problem::Problem;
 
 /// Most poles of a fit.
@@ -57,7 +58,46 @@ pub fn fit(samples: &Samples, settings: &Settings) -> Result<Fit, FitError> {
     samples.check_clipped()?;
     let problem = Problem::new(samples, settings);
     let best = start::best(&problem)?;
-    report::report(&problem, settings, &best)
+    let straight_through = settings.structure.zeros() == settings.structure.poles();
+    match settings.dead_time {
+        DeadTime::Estimated { least_s, most_s }
+            if straight_through && settings.between == Between::Held =>
+        {
+            to_a_step(samples, settings, [least_s, most_s], problem.dead_time_s(&best.theta))
+        }
+        _ => report::report(&problem, settings, &best),
+    }
+}
+
+/// Whole steps on either side of the first estimate that are tried.
+const STEPS_BESIDE: u32 = 2;
+
+/// With as many zeros as poles and a held input, a dead time within a step is
+/// another numerator: only the whole step can be told.
+fn to_a_step(
+    samples: &Samples,
+    settings: &Settings,
+    [least_s, most_s]: [f64; 2],
+    near_s: f64,
+) -> Result<Fit, FitError> {
+    let dt_s = samples.dt_s();
+    let first = (near_s / dt_s).floor() - f64::from(STEPS_BESIDE);
+    let whole = (0..=2 * STEPS_BESIDE + 1).map(|k| (first + f64::from(k)) * dt_s);
+    let mut found = Vec::new();
+    for dead_time_s in whole.filter(|dead_time_s| (least_s..=most_s).contains(dead_time_s)) {
+        let settings = Settings { dead_time: DeadTime::Given(dead_time_s), ..*settings };
+        let problem = Problem::new(samples, &settings);
+        found.extend(start::best(&problem).ok().map(|best| (settings, problem, best)));
+    }
+    let least = found.iter().min_by(|a, b| a.2.squares.total_cmp(&b.2.squares));
+    let (settings, problem, best) = least.ok_or(FitError::NoStart)?;
+    let dead_time_s = problem.dead_time_s(&[]);
+    if dead_time_s + dt_s > most_s {
+        return Err(FitError::DeadTimeAtBound { end: "upper", bound_s: most_s });
+    }
+    let mut fit = report::report(problem, settings, best)?;
+    fit.notes.push(Note::DeadTimeToAStep { dead_time_s });
+    Ok(fit)
 }
 
 #[cfg(test)]

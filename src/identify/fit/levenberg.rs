@@ -71,13 +71,16 @@ pub(super) fn descend(problem: &Problem, start: &[f64], most_steps: usize) -> Op
     let mut left = residuals(problem, &theta)?;
     let mut squares = dot(&left, &left);
     let mut damping = 1e-3;
+    // Less than this of the residuals' variance tells nothing about a parameter.
+    #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
+    let nothing = 1e-5 / left.len() as f64;
+    let mut idle = 0;
     for _ in 0..most_steps {
         let scales = problem.scales(&theta);
         let Some(columns) = problem.jacobian(&theta, &scales) else { break };
         let slope: Vec<f64> = columns.iter().map(|c| dot(c, &left)).collect();
         let normal = held_normal(problem, &theta, &columns, &slope);
         let before = squares;
-        let mut moved_by = 0.0_f64;
         for _ in 0..12 {
             let Some(step) = damped(&normal, damping) else {
                 damping *= 10.0;
@@ -91,7 +94,6 @@ pub(super) fn descend(problem: &Problem, start: &[f64], most_steps: usize) -> Op
             let tried = residuals(problem, &next).map(|left| (dot(&left, &left), left));
             match tried {
                 Some((less, new)) if less < squares => {
-                    moved_by = relative_step(&theta, &next, &scales);
                     (theta, squares, left) = (next, less, new);
                     damping = (damping * 0.1).max(1e-12);
                     break;
@@ -99,16 +101,12 @@ pub(super) fn descend(problem: &Problem, start: &[f64], most_steps: usize) -> Op
                 _ => damping *= 10.0,
             }
         }
-        if before - squares <= 1e-11 * before && moved_by < 1e-6 || squares == before {
+        idle = if before - squares <= nothing * before { idle + 1 } else { 0 };
+        if idle == 2 || squares == before {
             break;
         }
     }
     Some(Outcome { theta, squares })
-}
-
-fn relative_step(from: &[f64], to: &[f64], scales: &[f64]) -> f64 {
-    let parts = from.iter().zip(to).zip(scales).map(|((a, b), scale)| ((b - a) / scale).abs());
-    parts.fold(0.0, f64::max)
 }
 
 /// Normal equations of the parameters that may move.

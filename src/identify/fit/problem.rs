@@ -61,6 +61,18 @@ impl Problem {
         }
     }
 
+    /// The same with the means of so many samples each: input and output that are
+    /// averaged alike still belong together.
+    pub fn thinned(&self, factor: usize) -> Self {
+        #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
+        let n = factor as f64;
+        let means = |row: &[f64]| -> Vec<f64> {
+            row.chunks_exact(factor).map(|part| part.iter().sum::<f64>() / n).collect()
+        };
+        let (input, output) = (means(&self.input), means(&self.output));
+        Self { input, output, dt_s: n * self.dt_s, ..self.clone() }
+    }
+
     pub fn layout(&self) -> Layout {
         let poles_from = self.zeros + 1;
         let mut total = poles_from + self.poles;

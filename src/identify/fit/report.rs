@@ -32,7 +32,14 @@ pub struct Parameter {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Note {
     /// The estimate of the dead time was its lower end of 0: it was taken out.
+    /// Where the fit is poor beside, the output may run ahead of the input.
     NoDeadTime,
+    /// With as many zeros as poles and a held input the dead time can be told to a
+    /// whole step only; it has no standard error.
+    DeadTimeToAStep {
+        /// That whole number of steps \[s\].
+        dead_time_s: f64,
+    },
     /// The data do not determine this parameter
     /// ([`Settings::accept_undetermined`]).
     Undetermined(String),
@@ -215,7 +222,10 @@ fn assemble(problem: &Problem, settings: &Settings, best: &Outcome) -> Result<Fi
     let turn = named.slopes(problem, settings.structure, theta, &scales);
     let covariance = &turn * &spread.coloured * turn.transpose();
     let covariance_if_white = &turn * &spread.white * turn.transpose();
-    let sigma = |of: &DMatrix<f64>, i: usize| of[(i, i)].max(0.0).sqrt();
+    // Nothing holds a parameter whose variance is lost in rounding.
+    let sigma = |of: &DMatrix<f64>, i: usize| {
+        if of[(i, i)] > 0.0 { of[(i, i)].sqrt() } else { f64::INFINITY }
+    };
     let parameters: Vec<Parameter> = (0..named.names.len())
         .map(|i| Parameter {
             name: named.names[i].clone(),

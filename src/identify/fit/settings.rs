@@ -61,7 +61,8 @@ impl Structure {
 pub enum DeadTime {
     /// Known \[s\]; 0 for none.
     Given(f64),
-    /// Estimated within a range, to a part of a step.
+    /// Estimated within a range, to a part of a step; to a whole step where the input
+    /// is held and there are as many zeros as poles.
     Estimated {
         /// Lower end \[s\].
         least_s: f64,

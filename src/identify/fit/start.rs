@@ -19,8 +19,20 @@ const TO_THE_END: usize = 2;
 const FEW_STEPS: usize = 8;
 const MANY_STEPS: usize = 200;
 
+/// A longer record is thinned out to at least this many samples for the search;
+/// the last descent is on all of them.
+const ENOUGH: usize = 2000;
+
 /// The best model that any of the starts leads to.
 pub(super) fn best(problem: &Problem) -> Result<Outcome, FitError> {
+    let factor = problem.output.len() / ENOUGH;
+    let followed = if factor < 2 { search(problem) } else { search(&problem.thinned(factor)) };
+    let ends = followed.iter().filter_map(|start| descend(problem, &start.theta, MANY_STEPS));
+    ends.min_by(|a, b| a.squares.total_cmp(&b.squares)).ok_or(FitError::NoStart)
+}
+
+/// The few models from which it is worth while to go on.
+fn search(problem: &Problem) -> Vec<Outcome> {
     let mut starts = candidates(problem);
     starts.sort_by(|a, b| a.squares.total_cmp(&b.squares));
     starts.dedup_by(|b, a| (b.squares - a.squares).abs() < 1e-6 * a.squares);
@@ -32,8 +44,7 @@ pub(super) fn best(problem: &Problem) -> Result<Outcome, FitError> {
         starts.iter().filter_map(|start| descend(problem, &start.theta, FEW_STEPS)).collect();
     followed.sort_by(|a, b| a.squares.total_cmp(&b.squares));
     followed.truncate(TO_THE_END);
-    let ends = followed.iter().filter_map(|start| descend(problem, &start.theta, MANY_STEPS));
-    ends.min_by(|a, b| a.squares.total_cmp(&b.squares)).ok_or(FitError::NoStart)
+    followed
 }
 
 /// The best model with a pole fewer and another that is hardly seen: a model

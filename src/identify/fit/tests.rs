@@ -7,9 +7,11 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
+use crate::identify::prbs::Prbs;
 use crate::model::{FirstOrder, TransferFunction, simulate};
 
 mod accuracy;
+mod many;
 mod refusal;
 
 fn white(seed: u64, n: usize, sigma: f64) -> Vec<f64> {
@@ -41,14 +43,9 @@ fn spread_of(row: &[f64]) -> f64 {
     super::problem::spread(row)
 }
 
-/// A maximal-length sequence of nine bits, its taps at 9 and 5, as −1 and 1.
+/// A maximal-length sequence of nine bits as −1 and 1.
 fn prbs(bits: usize, samples_a_bit: usize) -> Vec<f64> {
-    let mut row = vec![true; 9];
-    while row.len() < bits {
-        let k = row.len();
-        row.push(row[k - 9] ^ row[k - 4]);
-    }
-    let levels = row.iter().take(bits).map(|bit| if *bit { 1.0 } else { -1.0 });
+    let levels = Prbs::new(9).unwrap().take(bits).map(|bit| if bit { 1.0 } else { -1.0 });
     levels.flat_map(|level| std::iter::repeat_n(level, samples_a_bit)).collect()
 }
 

@@ -13,6 +13,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::identify::fit::{
     Before, DataError, DeadTime, FitError, Level, Samples, Settings, Structure, fit,
 };
+use crate::identify::prbs::{NoSuchLength, Prbs};
 use crate::model::{Between, ModelError, simulate};
 
 const DT_S: f64 = 0.05;
@@ -21,8 +22,6 @@ const SAMPLES_A_BIT: usize = 14;
 const VOLTS: f64 = 0.4;
 const NOISE_LAG_S: f64 = 0.15;
 const NOISE_SHARE: f64 = 0.19;
-/// Bits until the sequence repeats.
-const PERIOD: usize = 1023;
 
 /// Poles, zeros and the published fit \[%\].
 pub const PUBLISHED: [(usize, usize, f64); 8] = [
@@ -76,6 +75,9 @@ pub enum FitTableError {
     /// The simulated samples.
     #[error(transparent)]
     Data(#[from] DataError),
+    /// The excitation.
+    #[error(transparent)]
+    Sequence(#[from] NoSuchLength),
     /// No seeds.
     #[error("a table needs at least one seed")]
     NoSeeds,
@@ -127,7 +129,7 @@ fn settings(poles: usize, zeros: usize) -> Settings {
 /// Screw speed and flow about the operating point, from another place in the
 /// sequence and with other noise for each number.
 fn run(number: u64) -> Result<Samples, FitTableError> {
-    let volts = excitation(number);
+    let volts = excitation(number)?;
     let drive = super::drive()?;
     let rpm = simulate(&drive, &volts, DT_S)?;
     let mut flow = simulate(&drive.series(&super::flow()?)?, &volts, DT_S)?;
@@ -168,23 +170,12 @@ fn spread(row: &[f64]) -> f64 {
 }
 
 /// A run's voltages about the operating point; each run goes on in the sequence
-/// where the one before ended.
-fn excitation(number: u64) -> Vec<f64> {
+/// with taps at 10 and 7 where the one before ended.
+fn excitation(number: u64) -> Result<Vec<f64>, NoSuchLength> {
     let bits = SAMPLES.div_ceil(SAMPLES_A_BIT);
-    let place = usize::try_from(number).unwrap_or(0).wrapping_mul(bits) % PERIOD;
-    let volts =
-        sequence(place + bits).into_iter().skip(place).map(|bit| if bit { VOLTS } else { -VOLTS });
-    volts.flat_map(|volts| [volts; SAMPLES_A_BIT]).take(SAMPLES).collect()
-}
-
-/// The maximal-length sequence of ten bits with taps at 10 and 7.
-fn sequence(bits: usize) -> Vec<bool> {
-    let mut row = vec![true; 10];
-    while row.len() < bits {
-        let k = row.len();
-        row.push(row[k - 10] ^ row[k - 3]);
-    }
-    row
+    let sequence = Prbs::new(10)?.skip(usize::try_from(number).unwrap_or(0).wrapping_mul(bits));
+    let volts = sequence.map(|bit| if bit { VOLTS } else { -VOLTS });
+    Ok(volts.flat_map(|volts| [volts; SAMPLES_A_BIT]).take(SAMPLES).collect())
 }
 
 #[cfg(test)]
@@ -206,17 +197,5 @@ mod tests {
         assert!(of(2, 0) > of(1, 1) + 10.0 && of(2, 2) > of(2, 0) + 1.0, "{found:?}");
         assert!(of(3, 2) < of(2, 2) + 0.1, "{found:?}");
         assert_eq!(table.example.len(), SAMPLES);
-    }
-
-    #[test]
-    fn the_sequence_holds_every_pattern_of_ten_bits_but_one() {
-        let mut seen: Vec<u16> = sequence(PERIOD + 9)
-            .windows(10)
-            .map(|ten| ten.iter().fold(0, |word, bit| 2 * word + u16::from(*bit)))
-            .collect();
-        seen.sort_unstable();
-        seen.dedup();
-        assert_eq!(seen.len(), PERIOD);
-        assert!(!seen.contains(&0));
     }
 }

@@ -38,6 +38,20 @@ fn a_dead_time_is_found_to_a_part_of_a_step_and_its_range_is_told() {
 }
 
 #[test]
+fn beside_a_zero_that_passes_straight_through_a_dead_time_is_told_to_a_step() {
+    let tf = |dead_time_s| {
+        let model = FirstOrder { gain: 2.0, time_constant_s: 0.84, zero_s: 0.3, dead_time_s };
+        model.transfer().unwrap()
+    };
+    let zero = Structure::FirstOrder { zero: true };
+    let found = fit(&driven(&tf(0.42), 0.05, 1), &from_rest(zero, UP_TO_2_S)).unwrap();
+    assert!((found.model.dead_time_s() - 0.42).abs() < 1e-9, "{found:?}");
+    assert!(matches!(found.notes[..], [Note::DeadTimeToAStep { .. }]), "{:?}", found.notes);
+    let zero = found.parameter("zero_s").unwrap();
+    assert!((zero.value - 0.3).abs() < 4.0 * zero.sigma, "{zero:?}");
+}
+
+#[test]
 fn a_dead_time_that_is_none_is_taken_out_and_said() {
     let found = (0..16).map(|seed| {
         let samples = driven(&late(0.0), 0.05, seed);
