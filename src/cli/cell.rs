@@ -11,7 +11,7 @@ use crate::config::Cell;
 use crate::config::cell::{CalibrationSource, ExtruderPart, Purpose};
 use crate::config::extruder::Strategy;
 use crate::extruder::Law;
-use crate::extruder::law::{Constant, Played};
+use crate::extruder::law::{AdaptiveNozzle, Constant, Played, ScrewFill};
 use crate::identify::profile;
 use crate::io::calibration_file;
 use crate::sim::cell::Rig;
@@ -77,11 +77,14 @@ impl LoadedCell {
         let law = match &part.extruder.strategy {
             Strategy::Constant { value } => Law::Constant(Constant(*value)),
             Strategy::Profile { file } => Law::Profile(read_profile(file, part)?),
+            Strategy::Screw(settings) => Law::Screw(ScrewFill::new(settings)?),
+            Strategy::Adaptive(parts) => Law::Adaptive(AdaptiveNozzle::new(parts.0, parts.1)),
         };
+        let seed = self.cell.simulation.seed;
         Ok(Some(Rig {
             setup: part.extruder.setup(law),
             demand: part.demand,
-            plant: SimExtruder::of(plant),
+            plant: SimExtruder::of(plant, seed)?,
             nominal_flow: part.plant_nominal,
         }))
     }

@@ -2,7 +2,15 @@
 //! may be told, and for a simulated cell what answers. There are no defaults
 //! for limits.
 
-use std::path::{Path, PathBuf};
+mod adaptive;
+mod plant;
+mod screw;
+mod strategy;
+
+use std::path::Path;
+
+pub use plant::{ExtruderPlant, LinearPlant, PlantKind, ScrewPlant};
+pub use strategy::Strategy;
 
 use super::table::Table;
 use crate::extruder::demand::section;
@@ -47,27 +55,6 @@ pub struct Rates {
     pub io_hz: f64,
 }
 
-/// How commands are found.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Strategy {
-    /// One command.
-    Constant {
-        /// In the unit of the command.
-        value: f64,
-    },
-    /// Commands from a file.
-    Profile {
-        /// CSV with `time_s` and the command's column.
-        file: PathBuf,
-    },
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Word {
-    Constant,
-    Profile,
-}
-
 /// The keys of a command's limits, which carry its unit.
 struct Keys {
     value: &'static str,
@@ -104,12 +91,15 @@ impl Extruder {
         if drive.is_none() {
             table.pass_over();
         }
+        let rates = read_rates(table);
         let limits = drive.and_then(|drive| read_limits(table, drive));
-        let strategy = drive.and_then(|drive| read_strategy(table, folder, drive, limits));
+        let strategy = drive.zip(rates).and_then(|(drive, rates)| {
+            let about = About { folder, drive, limits, rates };
+            Strategy::read(table, &about)
+        });
         let height = table.number("layer_height_mm", 1e-3..=1e4);
         let follows = table
             .choice("follows", &[("robot", Follows::Robot), ("start_speed", Follows::StartSpeed)]);
-        let rates = read_rates(table);
         let max_gap = table.number("max_gap_s", 0.01..=60.0);
         let max_hold = table.number("max_hold_s", 0.1..=3600.0);
         let max_pressure = table.optional_number("max_pressure_mpa", 1e-6..=1e4);
@@ -156,6 +146,14 @@ impl Extruder {
     }
 }
 
+/// What the reading of a strategy hangs on.
+struct About<'a> {
+    folder: &'a Path,
+    drive: Drive,
+    limits: Option<CommandLimits>,
+    rates: Rates,
+}
+
 fn read_limits(table: &Table<'_>, drive: Drive) -> Option<CommandLimits> {
     let keys = keys(drive);
     let min = table.number(keys.min, ANY);
@@ -167,29 +165,6 @@ fn read_limits(table: &Table<'_>, drive: Drive) -> Option<CommandLimits> {
         return None;
     }
     CommandLimits::new(min, max, rate?).ok()
-}
-
-fn read_strategy(
-    table: &Table<'_>,
-    folder: &Path,
-    drive: Drive,
-    limits: Option<CommandLimits>,
-) -> Option<Strategy> {
-    let words = [("constant", Word::Constant), ("profile", Word::Profile)];
-    let word = table.required_choice("strategy", &words);
-    if word.is_none() {
-        table.pass_over();
-    }
-    match word? {
-        Word::Constant => {
-            let key = keys(drive).value;
-            let (low, high) = limits.map_or((f64::MIN, f64::MAX), |limits| limits.range());
-            table.number(key, low..=high).map(|value| Strategy::Constant { value })
-        }
-        Word::Profile => {
-            table.text("profile").map(|file| Strategy::Profile { file: folder.join(file) })
-        }
-    }
 }
 
 fn read_rates(table: &Table<'_>) -> Option<Rates> {
@@ -205,46 +180,4 @@ fn read_rates(table: &Table<'_>) -> Option<Rates> {
         }
     }
     Some(rates)
-}
-
-/// The simulated extruder of a cell.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ExtruderPlant {
-    /// What turns commands into flow.
-    pub kind: PlantKind,
-    /// From the order to run until material moves.
-    pub start_delay: Span,
-    /// From the order to stop until nothing moves.
-    pub stop_delay: Span,
-    /// From the order to open or shut the valve until it has done so.
-    pub valve_delay: Span,
-}
-
-/// What turns commands into flow.
-#[derive(Debug, Clone, PartialEq)]
-pub enum PlantKind {
-    /// Flow in proportion to the command.
-    Direct {
-        /// Flow for each unit of the command \[mm³/s\].
-        gain_mm3_per_s: f64,
-    },
-}
-
-impl ExtruderPlant {
-    /// Reads `[extruder_plant]`.
-    pub fn read(table: &Table<'_>) -> Option<Self> {
-        let kind = table.required_choice("kind", &[("direct", ())]);
-        if kind.is_none() {
-            table.pass_over();
-        }
-        let kind = kind.and_then(|()| {
-            table
-                .number("gain_mm3_per_s", 1e-9..=1e12)
-                .map(|gain_mm3_per_s| PlantKind::Direct { gain_mm3_per_s })
-        });
-        let delay = |key| table.number_or(key, 0.0..=60.0, 0.0).map(Span::from_secs);
-        let (start, stop) = (delay("start_delay_s"), delay("stop_delay_s"));
-        let valve = delay("valve_delay_s");
-        Some(Self { kind: kind?, start_delay: start?, stop_delay: stop?, valve_delay: valve? })
-    }
 }

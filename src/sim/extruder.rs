@@ -3,21 +3,25 @@
 
 use crate::config::extruder::{ExtruderPlant, PlantKind};
 use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
+use crate::model::ModelError;
 use crate::ports::ExtruderPort;
 use crate::time::{Span, Stamp};
 use crate::units::Mm3PerS;
 
-pub mod direct;
+mod filled;
+mod linear;
 
-pub use direct::Direct;
+pub use filled::Filled;
+pub use linear::Linear;
 
 /// Step of a simulated plant.
-const STEP: Span = Span::from_millis(1);
+pub const STEP: Span = Span::from_millis(1);
 
 /// What turns commands into flow.
 pub trait Plant: std::fmt::Debug + Send {
-    /// Goes on by a time with a command, in the command's unit.
-    fn advance(&mut self, command: f64, dt: Span);
+    /// Goes on by [`STEP`] with a command, in the command's unit, or without
+    /// one while the pump stands.
+    fn advance(&mut self, command: Option<f64>);
 
     /// Flow that it would give through an open nozzle.
     fn flow(&self) -> Mm3PerS;
@@ -68,7 +72,6 @@ impl Switch {
 pub struct SimExtruder {
     plant: Box<dyn Plant>,
     delays: Delays,
-    step: Span,
     pump: Switch,
     valve: Switch,
     value: f64,
@@ -76,30 +79,31 @@ pub struct SimExtruder {
 }
 
 impl SimExtruder {
-    /// At rest, with a plant that is advanced by `step` at a time.
-    pub fn new(plant: Box<dyn Plant>, delays: Delays, step: Span) -> Self {
+    /// At rest.
+    pub fn new(plant: Box<dyn Plant>, delays: Delays) -> Self {
         let (pump, valve) = (Switch::new(), Switch::new());
-        Self { plant, delays, step, pump, valve, value: 0.0, now: Stamp::START }
+        Self { plant, delays, pump, valve, value: 0.0, now: Stamp::START }
     }
 
-    /// As a cell describes it.
-    pub fn of(plant: &ExtruderPlant) -> Self {
+    /// As a cell describes it; the seed is that of everything random. Fails
+    /// where a transfer function cannot be put on the grid of [`STEP`].
+    pub fn of(plant: &ExtruderPlant, seed: u64) -> Result<Self, ModelError> {
         let delays =
             Delays { start: plant.start_delay, stop: plant.stop_delay, valve: plant.valve_delay };
-        let kind: Box<dyn Plant> = match plant.kind {
-            PlantKind::Direct { gain_mm3_per_s } => Box::new(Direct::new(gain_mm3_per_s)),
+        let kind: Box<dyn Plant> = match &plant.kind {
+            PlantKind::Linear(linear) => Box::new(Linear::new(linear, seed)?),
+            PlantKind::Screw(screw) => Box::new(Filled::new(screw, seed)),
         };
-        Self::new(kind, delays, STEP)
+        Ok(Self::new(kind, delays))
     }
 
     /// Goes on to a moment.
     pub fn advance(&mut self, now: Stamp) {
-        while self.now + self.step <= now {
-            self.now = self.now + self.step;
+        while self.now + STEP <= now {
+            self.now = self.now + STEP;
             self.pump.advance(self.now);
             self.valve.advance(self.now);
-            let command = if self.pump.on { self.value } else { 0.0 };
-            self.plant.advance(command, self.step);
+            self.plant.advance(self.pump.on.then_some(self.value));
         }
     }
 
@@ -153,6 +157,8 @@ impl ExtruderPort for Option<SimExtruder> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::extruder::LinearPlant;
+    use crate::model::TransferFunction;
 
     fn extruder() -> SimExtruder {
         let delays = Delays {
@@ -160,7 +166,15 @@ mod tests {
             stop: Span::from_millis(200),
             valve: Span::from_millis(50),
         };
-        SimExtruder::new(Box::new(Direct::new(10.0)), delays, Span::from_millis(1))
+        let plant = LinearPlant {
+            transfer: TransferFunction::gain(10.0).unwrap(),
+            unknown_input: 0.0,
+            unknown_input_per_s: 0.0,
+            flow_noise: 0.0,
+            flow_noise_lag_s: 0.15,
+            sensor_noise: None,
+        };
+        SimExtruder::new(Box::new(Linear::new(&plant, 1).unwrap()), delays)
     }
 
     fn flow_at(extruder: &mut SimExtruder, secs: f64) -> f64 {

@@ -14,6 +14,9 @@ use crate::units::Mm3PerS;
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScrewFill {
     control: ScrewControl,
+    /// How long the screw has turned: its own clock, for what is on its way
+    /// stands while it stands.
+    turned: Stamp,
     hold: f64,
     fill: f64,
 }
@@ -23,7 +26,7 @@ impl ScrewFill {
     pub fn new(settings: &ScrewSettings) -> Result<Self, ScrewError> {
         let control = ScrewControl::new(settings)?;
         let hold = settings.law.hold();
-        Ok(Self { control, hold, fill: hold })
+        Ok(Self { control, turned: Stamp::START, hold, fill: hold })
     }
 }
 
@@ -37,11 +40,13 @@ impl Strategy for ScrewFill {
         self.wish()
     }
 
-    fn foresee(&mut self, _dt: Span, _flow: Mm3PerS) {}
+    fn foresee(&mut self, dt: Span, _flow: Mm3PerS) {
+        self.turned = self.turned + dt.max(Span::ZERO);
+    }
 
-    fn answer(&mut self, now: Stamp, _dt: Span, report: &ExtruderReport) -> Result<(), Unusable> {
+    fn answer(&mut self, _now: Stamp, _dt: Span, report: &ExtruderReport) -> Result<(), Unusable> {
         let plug = report.filled_mm.ok_or(Unusable)?;
-        self.fill = self.control.step(now, plug).map_err(|_| Unusable)?.fill;
+        self.fill = self.control.step(self.turned, plug).map_err(|_| Unusable)?.fill;
         Ok(())
     }
 
@@ -49,10 +54,10 @@ impl Strategy for ScrewFill {
         Wish { value: self.fill, feedforward: self.hold, feedback: self.fill - self.hold }
     }
 
-    fn settle(&mut self, now: Stamp, applied: f64) {
+    fn settle(&mut self, _now: Stamp, applied: f64) {
         // What is on its way is what was fed, not what was wished for.
         if (applied - self.control.fed()).abs() > f64::EPSILON {
-            let _ = self.control.applied(now, applied);
+            let _ = self.control.applied(self.turned, applied);
         }
     }
 }

@@ -1,0 +1,67 @@
+//! A transfer function from command to flow, with what no model tells: an
+//! unknown input, and a flow that wanders.
+
+use super::{Plant, STEP};
+use crate::config::extruder::LinearPlant;
+use crate::extruder::ExtruderReport;
+use crate::model::{Between, ModelError, Simulator};
+use crate::sim::hash::{mix, normal_pair};
+use crate::units::Mm3PerS;
+
+/// Keeps the random numbers of flow and sensor apart from others of a seed.
+const FLOW: u64 = 0x0000_666c_6f77;
+const SENSOR: u64 = 0x7365_6e73;
+
+/// The plant with its memory.
+#[derive(Debug)]
+pub struct Linear {
+    simulator: Simulator,
+    plant: LinearPlant,
+    seed: u64,
+    steps: u64,
+    reports: u64,
+    modelled: f64,
+    wandering: f64,
+}
+
+impl Linear {
+    /// At rest. Fails where the transfer function cannot be put on the grid.
+    pub fn new(plant: &LinearPlant, seed: u64) -> Result<Self, ModelError> {
+        let simulator = Simulator::new(&plant.transfer, STEP.secs(), Between::Held)?;
+        let plant = plant.clone();
+        let (steps, reports, modelled, wandering) = (0, 0, 0.0, 0.0);
+        Ok(Self { simulator, plant, seed, steps, reports, modelled, wandering })
+    }
+
+    fn unknown(&self) -> f64 {
+        #[expect(clippy::cast_precision_loss, reason = "milliseconds of a run")]
+        let at_s = self.steps as f64 * STEP.secs();
+        self.plant.unknown_input + self.plant.unknown_input_per_s * at_s
+    }
+}
+
+impl Plant for Linear {
+    fn advance(&mut self, command: Option<f64>) {
+        let input = command.map_or(0.0, |command| command + self.unknown());
+        self.modelled = self.simulator.step(input);
+        if self.plant.flow_noise > 0.0 {
+            let kept = libm::exp(-STEP.secs() / self.plant.flow_noise_lag_s);
+            let [fresh, _] = normal_pair(mix(&[self.seed, FLOW, self.steps]));
+            let size = self.plant.flow_noise * (1.0 - kept * kept).sqrt();
+            self.wandering = kept * self.wandering + size * fresh;
+        }
+        self.steps += 1;
+    }
+
+    fn flow(&self) -> Mm3PerS {
+        Mm3PerS::new((self.modelled + self.wandering).max(0.0)).unwrap_or_default()
+    }
+
+    fn sense(&mut self, report: &mut ExtruderReport) {
+        if let Some(noise) = self.plant.sensor_noise {
+            let [fresh, _] = normal_pair(mix(&[self.seed, SENSOR, self.reports]));
+            self.reports += 1;
+            report.flow_mm3_per_s = Mm3PerS::new(self.flow().get() + noise * fresh).ok();
+        }
+    }
+}
