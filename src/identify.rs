@@ -2,14 +2,18 @@
 //! data are cleaned and aligned, and how models are fitted to them.
 
 pub mod align;
+pub mod band;
 pub mod excitation;
 pub mod experiment;
+pub mod file;
 pub mod fit;
 pub mod flow;
 pub mod grid;
 pub mod hampel;
+pub mod library;
 pub mod prbs;
 pub mod profile;
 pub mod quantity;
+pub mod residual;
 pub mod savgol;
 pub mod table;

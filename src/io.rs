@@ -5,6 +5,7 @@ pub mod camera;
 pub mod clock;
 pub mod foxglove;
 pub mod image_file;
+pub mod model_file;
 pub mod record;
 pub mod recording;
 pub mod robot;

@@ -297,6 +297,23 @@ impl<'a> Table<'a> {
         self.optional_text(key)
     }
 
+    /// A row of texts that must be there, none of them empty.
+    pub fn texts(&self, key: &'static str) -> Option<Vec<String>> {
+        let expected = "texts in brackets, each in quotes";
+        let Some(value) = self.get(key) else {
+            self.absent(key, expected);
+            return None;
+        };
+        let texts = value.get_ref().as_array().and_then(|array| {
+            let text = |item: &Spanned<DeValue<'a>>| item.get_ref().as_str().map(str::to_owned);
+            array.iter().map(|item| text(item).filter(|text| !text.is_empty())).collect()
+        });
+        if texts.is_none() {
+            self.report(key, shown(value.get_ref()), expected);
+        }
+        texts
+    }
+
     /// One of several words, or the first where the key is absent.
     pub fn choice<T: Copy>(&self, key: &'static str, words: &[(&str, T)]) -> Option<T> {
         let Some(value) = self.get(key) else { return words.first().map(|word| word.1) };

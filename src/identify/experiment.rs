@@ -5,8 +5,7 @@ mod suspicion;
 
 use std::fmt;
 
-use self::suspicion::clipped_share;
-pub use self::suspicion::{Clipped, doubt_unit};
+pub use self::suspicion::doubt_unit;
 use super::grid::{Gap, Grid, usual_step};
 
 /// Samples that a model takes at least.
@@ -98,18 +97,6 @@ pub enum DataError {
         /// Its value.
         value: f64,
     },
-    /// A sensor at the end of its range.
-    #[error(
-        "the {side} is clipped: {:.1} % of its samples are exactly {} ({} separate times); measure \
-         with a wider range, or say --accept-clipped if it is a command with limits",
-        100.0 * .clipped.share, .clipped.value, .clipped.visits
-    )]
-    Clipped {
-        /// Which one.
-        side: Side,
-        /// How and where.
-        clipped: Clipped,
-    },
     /// A part that tells nothing.
     #[error("{got} samples are left to validate with: {FEWEST_SAMPLES} or more are needed")]
     ShortValidation {
@@ -135,13 +122,6 @@ pub enum Note {
         /// Step of the grid \[s\].
         step_s: f64,
     },
-    /// A limit that was accepted.
-    Clipped {
-        /// Which one.
-        side: Side,
-        /// How and where.
-        clipped: Clipped,
-    },
 }
 
 impl fmt::Display for Note {
@@ -161,12 +141,6 @@ impl fmt::Display for Note {
                 step_s,
                 1.0 / step_s
             ),
-            Self::Clipped { side, clipped } => write!(
-                f,
-                "the {side} is exactly {} in {:.1} % of the samples: a limit acts there",
-                clipped.value,
-                100.0 * clipped.share
-            ),
         }
     }
 }
@@ -176,8 +150,6 @@ impl fmt::Display for Note {
 pub struct Rules {
     /// Gaps up to this are bridged \[s\]; none for five steps.
     pub max_gap_s: Option<f64>,
-    /// Whether a column may be clipped.
-    pub accept_clipped: bool,
     /// Whether the unit of time was told, and is not doubted.
     pub time_is_told: bool,
 }
@@ -214,15 +186,9 @@ impl Experiment {
         }
         check_time(time_s, rules)?;
         let grid = Grid::of(time_s).ok_or(DataError::TooFew { got })?;
-        let mut notes = bridge(&grid, rules)?;
+        let notes = bridge(&grid, rules)?;
         for (side, values) in [(Side::Input, input), (Side::Output, output)] {
             check_moves(side, values)?;
-            if let Some(clipped) = clipped_share(values) {
-                if !rules.accept_clipped {
-                    return Err(DataError::Clipped { side, clipped });
-                }
-                notes.push(Note::Clipped { side, clipped });
-            }
         }
         let input_is_held = is_held(input);
         let (input, output) = if grid.is_uneven {

@@ -121,31 +121,6 @@ fn constant_columns() {
 }
 
 #[test]
-fn clipped_columns_and_those_that_only_settle() {
-    let [times, input, output] = columns();
-    let wave: Vec<f64> = times.iter().map(|t| 30.0 + 10.0 * (4.0 * t).sin()).collect();
-    let cut = wave.iter().map(|rpm| rpm.min(36.0)).collect();
-    let data = [times.clone(), cut, output.clone()];
-    let said = refusal(&data);
-    assert!(said.contains("the input is clipped") && said.contains("exactly 36"), "{said}");
-    let rules = Rules { accept_clipped: true, ..Rules::default() };
-    let accepted = Experiment::new(&data[0], &data[1], &data[2], &rules).unwrap();
-    assert!(matches!(accepted.notes[..], [Note::Clipped { side: Side::Input, .. }]));
-    let cut = wave.iter().map(|rpm| (25.0 * rpm).max(600.0)).collect();
-    assert!(refusal(&[times.clone(), input.clone(), cut]).contains("the output is clipped"));
-    // Settled to a rounded value many times over is not clipped.
-    let mut flow = 500.0;
-    let settled = times.iter().map(|t| {
-        let wanted = if (6.0 * t).sin() > 0.0 { 1000.0 } else { 500.0 };
-        flow += 0.2 * (wanted - flow);
-        (flow * 10.0_f64).round() / 10.0
-    });
-    let settled: Vec<f64> = settled.collect();
-    assert!(settled.iter().filter(|flow| **flow == 1000.0).count() > 50);
-    assert!(taken(&[times, input, settled]).unwrap().notes.is_empty());
-}
-
-#[test]
 fn bar_that_is_called_megapascal() {
     let said = doubt_unit("nozzle_mpa", Unit::MPa, &[12.0, -230.0]).unwrap();
     assert!(said.contains("up to 230 MPa") && said.contains("--unit nozzle_mpa=bar"), "{said}");

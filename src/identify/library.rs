@@ -1,0 +1,253 @@
+//! Models by material, nozzle and temperature: which of those at hand is meant.
+
+use std::fmt;
+
+use super::file::ModelFile;
+use super::quantity::Unit;
+
+/// Nozzles that differ by less are the same \[mm\].
+const SAME_NOZZLE_MM: f64 = 0.005;
+/// Temperatures that differ by less are the same \[°C\].
+const SAME_TEMPERATURE_C: f64 = 0.01;
+/// A model is used this far from its temperature unless another tolerance is
+/// told \[°C\].
+pub const TOLERANCE_C: f64 = 5.0;
+
+/// A model and where it is kept.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// The file's name.
+    pub name: String,
+    /// What stands in it.
+    pub model: ModelFile,
+}
+
+/// The models that are at hand, in the order of their files' names.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Library {
+    entries: Vec<Entry>,
+}
+
+/// What is looked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wanted {
+    /// Material; capital letters do not count.
+    pub material: String,
+    /// Diameter of the nozzle \[mm\].
+    pub nozzle_mm: f64,
+    /// Temperature of the material \[°C\].
+    pub temperature_c: f64,
+    /// How far the model's temperature may be off \[°C\].
+    pub tolerance_c: f64,
+    /// Unit of the input, where it matters.
+    pub input: Option<Unit>,
+    /// Unit of the output, where it matters.
+    pub output: Option<Unit>,
+}
+
+/// The model that was meant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found<'a> {
+    /// The model and its file.
+    pub entry: &'a Entry,
+    /// Its temperature less the one that was asked for \[°C\].
+    pub off_c: f64,
+}
+
+/// No model, or more than one.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LibraryError {
+    /// None fits.
+    #[error("no model for {wanted}; {}", list(.known))]
+    Absent {
+        /// What was asked for.
+        wanted: String,
+        /// What is there.
+        known: Vec<String>,
+    },
+    /// More than one fits equally well.
+    #[error(
+        "{} models for {wanted} fit equally well: {}; keep one of them, or name its file", .fit.len(),
+        .fit.join("; ")
+    )]
+    Ambiguous {
+        /// What was asked for.
+        wanted: String,
+        /// Those that fit.
+        fit: Vec<String>,
+    },
+}
+
+fn list(known: &[String]) -> String {
+    match known {
+        [] => "there is no model at all".to_owned(),
+        some => format!("there are: {}", some.join("; ")),
+    }
+}
+
+impl fmt::Display for Wanted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { material, nozzle_mm, temperature_c, tolerance_c, .. } = self;
+        write!(f, "{material}, nozzle {nozzle_mm} mm, {temperature_c} ± {tolerance_c} °C")?;
+        match (self.input, self.output) {
+            (None, None) => Ok(()),
+            (Some(input), None) => write!(f, ", from {input}"),
+            (None, Some(output)) => write!(f, ", to {output}"),
+            (Some(input), Some(output)) => write!(f, ", {input} to {output}"),
+        }
+    }
+}
+
+impl fmt::Display for Entry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ModelFile { setting, input, output, .. } = &self.model;
+        write!(f, "{} ({}", self.name, setting.material.as_deref().unwrap_or("no material"))?;
+        if let Some(nozzle_mm) = setting.nozzle_mm {
+            write!(f, ", {nozzle_mm} mm")?;
+        }
+        if let Some(temperature_c) = setting.temperature_c {
+            write!(f, ", {temperature_c} °C")?;
+        }
+        write!(f, ", {} to {})", input.unit, output.unit)
+    }
+}
+
+impl Library {
+    /// Of these models.
+    pub fn new(mut entries: Vec<Entry>) -> Self {
+        entries.sort_by(|a, b| a.name.cmp(&b.name));
+        Self { entries }
+    }
+
+    /// All of them.
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// The model of this material and nozzle whose temperature is the nearest
+    /// within the tolerance. Models that do not tell all three are not looked
+    /// at.
+    pub fn find(&self, wanted: &Wanted) -> Result<Found<'_>, LibraryError> {
+        let off = |entry: &Entry| {
+            let setting = &entry.model.setting;
+            let same = setting.material.as_ref().is_some_and(|m| same_name(m, &wanted.material))
+                && setting.nozzle_mm.is_some_and(|d| (d - wanted.nozzle_mm).abs() < SAME_NOZZLE_MM)
+                && wanted.input.is_none_or(|unit| unit == entry.model.input.unit)
+                && wanted.output.is_none_or(|unit| unit == entry.model.output.unit);
+            let off_c = setting.temperature_c? - wanted.temperature_c;
+            (same && off_c.abs() <= wanted.tolerance_c).then_some(off_c)
+        };
+        let near: Vec<Found<'_>> = self
+            .entries
+            .iter()
+            .filter_map(|entry| Some(Found { entry, off_c: off(entry)? }))
+            .collect();
+        let least = near.iter().map(|found| found.off_c.abs()).fold(f64::INFINITY, f64::min);
+        let is_nearest = |found: &&Found<'_>| found.off_c.abs() < least + SAME_TEMPERATURE_C;
+        let nearest: Vec<&Found<'_>> = near.iter().filter(is_nearest).collect();
+        let names =
+            |entries: &mut dyn Iterator<Item = &Entry>| entries.map(Entry::to_string).collect();
+        match nearest[..] {
+            [only] => Ok(*only),
+            [] => {
+                let known = names(&mut self.entries.iter());
+                Err(LibraryError::Absent { wanted: wanted.to_string(), known })
+            }
+            _ => {
+                let fit = names(&mut nearest.iter().map(|found| found.entry));
+                Err(LibraryError::Ambiguous { wanted: wanted.to_string(), fit })
+            }
+        }
+    }
+}
+
+fn same_name(a: &str, b: &str) -> bool {
+    a.trim().to_lowercase() == b.trim().to_lowercase()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+    use crate::identify::file::Setting;
+    use crate::identify::quantity::Quantity;
+    use crate::model::TransferFunction;
+
+    fn entry(
+        name: &str,
+        material: &str,
+        nozzle_mm: f64,
+        temperature_c: f64,
+        output: Unit,
+    ) -> Entry {
+        let setting = Setting {
+            material: Some(material.to_owned()),
+            nozzle_mm: Some(nozzle_mm),
+            temperature_c: Some(temperature_c),
+        };
+        let model = ModelFile {
+            setting,
+            kind: "fopdt".to_owned(),
+            input: Quantity { name: "screw".to_owned(), unit: Unit::Rpm },
+            output: Quantity { name: "out".to_owned(), unit: output },
+            input_range: (0.0, 1.0),
+            operating_point: (0.0, 0.0),
+            transfer: TransferFunction::new(&[1.0], &[1.0, 1.0], 0.1).unwrap(),
+            uncertainty: None,
+            fit: None,
+        };
+        Entry { name: name.to_owned(), model }
+    }
+
+    fn library() -> Library {
+        Library::new(vec![
+            entry("pla-210.toml", "PLA", 0.4, 210.0, Unit::Mm3PerS),
+            entry("pla-200.toml", "PLA", 0.4, 200.0, Unit::Mm3PerS),
+            entry("pla-wide.toml", "PLA", 0.6, 205.0, Unit::Mm3PerS),
+            entry("pla-pressure.toml", "PLA", 0.4, 203.0, Unit::MPa),
+            entry("petg.toml", "PETG", 0.4, 240.0, Unit::Mm3PerS),
+        ])
+    }
+
+    fn wanted(material: &str, temperature_c: f64) -> Wanted {
+        Wanted {
+            material: material.to_owned(),
+            nozzle_mm: 0.4,
+            temperature_c,
+            tolerance_c: TOLERANCE_C,
+            input: Some(Unit::Rpm),
+            output: Some(Unit::Mm3PerS),
+        }
+    }
+
+    #[test]
+    fn the_nearest_temperature_of_the_same_material_and_nozzle_is_meant() {
+        let library = library();
+        let found = library.find(&wanted("pla", 204.0)).unwrap();
+        assert_eq!((found.entry.name.as_str(), found.off_c), ("pla-200.toml", -4.0));
+        assert_eq!(library.find(&wanted("PLA ", 214.0)).unwrap().entry.name, "pla-210.toml");
+        let any = Wanted { output: None, ..wanted("PLA", 204.0) };
+        assert_eq!(library.find(&any).unwrap().entry.name, "pla-pressure.toml");
+    }
+
+    #[test]
+    fn absence_says_what_is_there() {
+        let said = library().find(&wanted("PLA", 220.0)).unwrap_err().to_string();
+        assert!(
+            said.starts_with("no model for PLA, nozzle 0.4 mm, 220 ± 5 °C, rpm to mm³/s"),
+            "{said}"
+        );
+        assert!(said.contains("petg.toml (PETG, 0.4 mm, 240 °C, rpm to mm³/s); pla-200"), "{said}");
+        let none = Library::default().find(&wanted("PLA", 220.0)).unwrap_err().to_string();
+        assert!(none.ends_with("there is no model at all"), "{none}");
+    }
+
+    #[test]
+    fn two_that_fit_equally_well_are_both_named() {
+        let said = library().find(&wanted("PLA", 205.0)).unwrap_err().to_string();
+        assert!(said.starts_with("2 models for PLA"), "{said}");
+        assert!(said.contains("pla-200.toml") && said.contains("pla-210.toml"), "{said}");
+        assert!(!said.contains("pla-wide"), "{said}");
+    }
+}

@@ -1,0 +1,78 @@
+//! What a model leaves: whether it still hangs together.
+
+/// Of a normal variable 99 % lie within so many standard deviations.
+const NORMAL_99: f64 = 2.5758;
+
+/// How much a row repeats itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Autocorrelation {
+    /// Correlation with itself so many samples later, from 0 on, where it is 1.
+    pub lags: Vec<f64>,
+    /// 99 % of the lags of white noise lie within plus and minus this.
+    pub bound: f64,
+}
+
+impl Autocorrelation {
+    /// Up to a lag; of a row about its mean.
+    pub fn of(row: &[f64], longest: usize) -> Self {
+        let n = as_f64(row.len().max(1));
+        let mean = row.iter().sum::<f64>() / n;
+        let off: Vec<f64> = row.iter().map(|value| value - mean).collect();
+        let at = |lag: usize| -> f64 {
+            let later = off.get(lag..).unwrap_or_default();
+            off.iter().zip(later).map(|(a, b)| a * b).sum()
+        };
+        let whole = at(0);
+        let share = |lag| if whole > 0.0 { at(lag) / whole } else { 0.0 };
+        let longest = longest.min(row.len().saturating_sub(1));
+        Self { lags: (0..=longest).map(share).collect(), bound: NORMAL_99 / n.sqrt() }
+    }
+
+    /// Share of the lags from 1 on that white noise would hardly have: some 1 %
+    /// of them for white noise.
+    pub fn share_outside(&self) -> f64 {
+        let lags = self.lags.get(1..).unwrap_or_default();
+        let outside = lags.iter().filter(|lag| lag.abs() > self.bound).count();
+        as_f64(outside) / as_f64(lags.len().max(1))
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "counts of samples")]
+fn as_f64(count: usize) -> f64 {
+    count as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    fn noise(keep: f64) -> Vec<f64> {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
+        let mut value = 0.0;
+        let mut next = || {
+            let drawn: f64 = StandardNormal.sample(&mut random);
+            value = keep * value + drawn;
+            value
+        };
+        (0..20_000).map(|_| next()).collect()
+    }
+
+    #[test]
+    fn white_noise_stays_within_its_bounds_and_coloured_noise_does_not() {
+        let white = Autocorrelation::of(&noise(0.0), 200);
+        assert_eq!((white.lags[0], white.lags.len()), (1.0, 201));
+        assert!(white.share_outside() < 0.04, "{}", white.share_outside());
+        let coloured = Autocorrelation::of(&noise(0.9), 10);
+        assert!((coloured.lags[5] - 0.9_f64.powi(5)).abs() < 0.05, "{:?}", coloured.lags);
+        assert!(coloured.share_outside() > 0.9);
+    }
+
+    #[test]
+    fn nothing_correlates_with_nothing() {
+        assert_eq!(Autocorrelation::of(&[], 5).lags, [0.0]);
+        assert_eq!(Autocorrelation::of(&[3.0; 9], 3).lags, [0.0; 4]);
+    }
+}

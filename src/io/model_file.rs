@@ -1,0 +1,84 @@
+//! Reads models of extruders from the disk.
+
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use crate::config::Problems;
+use crate::identify::file::{self, ModelFile};
+use crate::identify::library::{Entry, Library};
+
+/// A model that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ModelFileError {
+    /// It cannot be read.
+    #[error("model {}: {what}; `truebead identify` makes one", path.display())]
+    Read {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        what: io::Error,
+    },
+    /// The folder of models cannot be read.
+    #[error("folder of models {}: {what}", path.display())]
+    Folder {
+        /// Which folder.
+        path: PathBuf,
+        /// What the system says.
+        what: io::Error,
+    },
+    /// What stands in it is wrong.
+    #[error(transparent)]
+    Content(#[from] Problems),
+}
+
+/// Reads the file of a model; everything that is wrong with it is reported at
+/// once.
+pub fn read(path: &Path) -> Result<ModelFile, ModelFileError> {
+    let text = fs::read_to_string(path)
+        .map_err(|what| ModelFileError::Read { path: path.to_owned(), what })?;
+    Ok(file::parse(&path.display().to_string(), &text)?)
+}
+
+/// Reads every `.toml` of a folder, not of those within it. Fails on the first
+/// one that is wrong: a model that was meant to be found must not be missed.
+pub fn read_library(folder: &Path) -> Result<Library, ModelFileError> {
+    let failed = |what| ModelFileError::Folder { path: folder.to_owned(), what };
+    let mut paths = Vec::new();
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if path.is_file() && path.extension().is_some_and(|ending| ending == "toml") {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    let entry = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(Entry { name, model: read(path)? })
+    };
+    let entries: Result<Vec<Entry>, ModelFileError> = paths.iter().map(entry).collect();
+    Ok(Library::new(entries?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shipped_models_are_sound() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
+        assert!(!read_library(&folder).unwrap().entries().is_empty());
+    }
+
+    #[test]
+    fn a_model_that_is_wrong_or_missing_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("a.toml"), "version = 1\n").unwrap();
+        fs::write(folder.path().join("notes.txt"), "not a model").unwrap();
+        let said = read_library(folder.path()).unwrap_err().to_string();
+        assert!(said.contains("a.toml: 4 problems"), "{said}");
+        let said = read_library(&folder.path().join("none")).unwrap_err().to_string();
+        assert!(said.starts_with("folder of models"), "{said}");
+        let said = read(&folder.path().join("none.toml")).unwrap_err().to_string();
+        assert!(said.contains("`truebead identify` makes one"), "{said}");
+    }
+}
