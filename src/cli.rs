@@ -32,6 +32,9 @@ pub mod cell;
 pub mod check;
 pub mod convert;
 pub mod demo;
+pub mod excite;
+pub mod identify;
+pub mod models;
 pub mod offset;
 pub mod outcome;
 pub mod process;
@@ -51,6 +54,7 @@ use tracing_subscriber::EnvFilter;
 
 use crate::config::Problems;
 use crate::io::calibration_file::CalibrationFileError;
+use crate::io::model_file::ModelFileError;
 
 /// Status of a command that finished, but with too many frames refused or
 /// records lost.
@@ -91,6 +95,9 @@ enum Command {
     Accuracy(accuracy::AccuracyArgs),
     Check(check::CheckArgs),
     Offset(offset::OffsetArgs),
+    Excite(excite::ExciteArgs),
+    Identify(identify::IdentifyArgs),
+    Models(models::ModelsArgs),
 }
 
 /// How much a command says on standard error.
@@ -134,6 +141,9 @@ pub fn main() -> ExitCode {
         Command::Accuracy(args) => accuracy::run(args, voice),
         Command::Check(args) => check::run(args),
         Command::Offset(args) => offset::run(args),
+        Command::Excite(args) => excite::run(args).map(|()| ExitCode::SUCCESS),
+        Command::Identify(args) => identify::run(args).map(|()| ExitCode::SUCCESS),
+        Command::Models(args) => models::run(args),
     };
     done.unwrap_or_else(|error| {
         tell!("error: {error:#}");
@@ -144,7 +154,10 @@ pub fn main() -> ExitCode {
 /// Configuration and arguments are told from failures at work.
 fn status_of(error: &anyhow::Error) -> ExitCode {
     let wrong = error.chain().any(|cause| {
-        cause.is::<WrongArguments>() || cause.is::<Problems>() || cause.is::<CalibrationFileError>()
+        cause.is::<WrongArguments>()
+            || cause.is::<Problems>()
+            || cause.is::<CalibrationFileError>()
+            || cause.is::<ModelFileError>()
     });
     ExitCode::from(if wrong { 2 } else { 1 })
 }

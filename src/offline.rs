@@ -8,6 +8,7 @@
 pub mod accuracy;
 pub mod calibration;
 pub mod edges;
+pub mod identify;
 pub mod log;
 pub mod names;
 pub mod offset;

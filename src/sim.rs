@@ -19,6 +19,7 @@ pub mod grains;
 pub mod hash;
 pub mod laid;
 pub mod light;
+pub mod logged;
 pub mod looey2026;
 pub mod motion;
 pub mod normal;

@@ -1,0 +1,184 @@
+//! `truebead excite`: profiles that an extruder is excited with.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use clap::{Args, Subcommand};
+
+use super::WrongArguments;
+use crate::identify::excitation::{Excitation, Shape};
+use crate::identify::profile::{Profile, file};
+use crate::identify::quantity::{Quantity, Unit};
+use crate::io::whole_file::write_whole;
+
+/// Writes a profile that excites an extruder, so that its model can be found.
+///
+/// A cell plays it on the extruder while everything is logged; `truebead identify`
+/// finds the model in the log.
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Examples:
+  truebead excite prbs --low 20 --high 40 --hold-s 0.7 --quantity screw_rpm --out profile.csv
+  truebead excite gaussian --low 2 --high 4 --hold-s 1.5 --duration-s 90 --quantity drive_v --out profile.csv
+  truebead excite steps --levels 20,40,30,20 --hold-s 15 --quantity screw_rpm --out profile.csv
+
+Which hold time: about a third of the time in which the extruder answers; it is excited
+up to 0.44 / hold time. The whole should last ten times as long as the slowest answer.
+
+The file has the columns time_s and the quantity; each value holds until the next line,
+and the last line tells the end.")]
+pub struct ExciteArgs {
+    #[command(subcommand)]
+    kind: Kind,
+}
+
+#[derive(Debug, Subcommand)]
+enum Kind {
+    Prbs(PrbsArgs),
+    Gaussian(GaussianArgs),
+    Steps(StepsArgs),
+}
+
+/// A pseudo-random binary sequence of maximal length between two levels
+#[derive(Debug, Args)]
+struct PrbsArgs {
+    /// Level of a zero
+    #[arg(long, allow_hyphen_values = true)]
+    low: f64,
+    /// Level of a one
+    #[arg(long, allow_hyphen_values = true)]
+    high: f64,
+    /// Bits of its shift register, 3 to 16: it repeats itself after 2^N − 1 bits
+    /// [default: 7, or what a longer --duration-s takes]
+    #[arg(long, value_name = "N")]
+    bits: Option<u32>,
+    #[command(flatten)]
+    all: All,
+}
+
+/// Levels that are drawn at random, normally distributed
+#[derive(Debug, Args)]
+struct GaussianArgs {
+    /// Smallest level
+    #[arg(long, allow_hyphen_values = true)]
+    low: f64,
+    /// Largest level
+    #[arg(long, allow_hyphen_values = true)]
+    high: f64,
+    /// Mean level
+    /// [default: midway]
+    #[arg(long, allow_hyphen_values = true)]
+    mean: Option<f64>,
+    /// Standard deviation
+    /// [default: a sixth of the way from the smallest to the largest level]
+    #[arg(long)]
+    sigma: Option<f64>,
+    /// The same seed gives the same levels
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    all: All,
+}
+
+/// Levels that are told, one after the other
+#[derive(Debug, Args)]
+struct StepsArgs {
+    /// The levels, such as 20,40,30
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, required = true)]
+    levels: Vec<f64>,
+    #[command(flatten)]
+    all: All,
+}
+
+#[derive(Debug, Args)]
+struct All {
+    /// How long each level is held; the bit time of a sequence [s]
+    #[arg(long, alias = "bit-s", value_name = "S")]
+    hold_s: f64,
+    /// How long it lasts, without what is before and after [s]
+    /// [default: one period of a sequence, each of the steps once]
+    #[arg(long, value_name = "S")]
+    duration_s: Option<f64>,
+    /// Time at the middle level (steps: the first one) before it [s]
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    lead_in_s: f64,
+    /// The same after it [s]
+    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    lead_out_s: f64,
+    /// What is commanded: the column's name, which ends with its unit (see the examples)
+    #[arg(long, value_name = "NAME")]
+    quantity: String,
+    /// File to write
+    #[arg(long, value_name = "FILE.csv")]
+    out: PathBuf,
+}
+
+/// Runs the command; the answer goes to standard output.
+pub fn run(args: &ExciteArgs) -> Result<()> {
+    let (shape, level, all) = match &args.kind {
+        Kind::Prbs(prbs) => {
+            let bits = prbs.bits.unwrap_or_else(|| bits_for(&prbs.all));
+            let shape = Shape::Prbs { bits, low: prbs.low, high: prbs.high };
+            (shape, f64::midpoint(prbs.low, prbs.high), &prbs.all)
+        }
+        Kind::Gaussian(gaussian) => {
+            let &GaussianArgs { low, high, seed, .. } = gaussian;
+            let mean = gaussian.mean.unwrap_or(f64::midpoint(low, high));
+            let sigma = gaussian.sigma.unwrap_or((high - low) / 6.0);
+            (Shape::Gaussian { mean, sigma, low, high, seed }, mean, &gaussian.all)
+        }
+        Kind::Steps(steps) => {
+            let first = steps.levels.first().copied().unwrap_or(0.0);
+            (Shape::Stairs(steps.levels.clone()), first, &steps.all)
+        }
+    };
+    all.check()?;
+    let excitation = Excitation { shape, hold_s: all.hold_s, duration_s: all.duration_s };
+    let profile = excitation
+        .profile()
+        .and_then(|profile| Ok(profile.with_lead(level, all.lead_in_s, all.lead_out_s)?))
+        .map_err(WrongArguments::new)?;
+    let band = excitation.band_hz().map_err(WrongArguments::new)?;
+    write_whole(&all.out, file::to_csv(&profile, &all.quantity).as_bytes())?;
+    tell(&profile, band, &all.quantity, &all.out);
+    Ok(())
+}
+
+impl All {
+    fn check(&self) -> Result<(), WrongArguments> {
+        if Quantity::of_column(&self.quantity, None).is_none() || self.quantity.contains(',') {
+            let units: Vec<&str> = Unit::all().map(Unit::word).collect();
+            return Err(WrongArguments::new(format!(
+                "--quantity {}: expected a name that ends with its unit, one of {}",
+                self.quantity,
+                units.join(", ")
+            )));
+        }
+        for (name, value) in [("--lead-in-s", self.lead_in_s), ("--lead-out-s", self.lead_out_s)] {
+            if !(0.0..=86_400.0).contains(&value) {
+                let what = format!("{name} {value}: expected 0 to 86400 s");
+                return Err(WrongArguments::new(what));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The shortest sequence that does not repeat itself, from 7 bits on.
+fn bits_for(all: &All) -> u32 {
+    let bits = all.duration_s.unwrap_or(0.0) / all.hold_s;
+    (7..16).find(|n| f64::from((1_u32 << n) - 1) >= bits).unwrap_or(16)
+}
+
+fn tell(profile: &Profile, (low_hz, high_hz): (f64, f64), column: &str, out: &Path) {
+    let unit = Unit::of_column(column).map_or("", Unit::symbol);
+    let (low, high) = profile.range();
+    let (count, end_s) = (profile.points().len(), profile.end_s());
+    say!("profile    {}: {count} values of {column}, {end_s:.1} s", out.display());
+    say!("values     {} to {} {unit}", short(low), short(high));
+    say!("excites    {low_hz:.4} to {high_hz:.3} Hz with half of its power density or more");
+}
+
+fn short(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}

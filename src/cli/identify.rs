@@ -1,0 +1,207 @@
+//! `truebead identify`: a model of an extruder from logged data.
+
+mod data;
+mod example;
+mod options;
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::Args;
+
+use self::options::{Columns, parse_dead_time, parse_forms, parse_hampel, parse_smooth};
+use super::WrongArguments;
+use super::outcome::free_folder;
+use crate::identify::experiment::Experiment;
+use crate::identify::file::{Setting, to_toml};
+use crate::identify::fit::{DeadTime, Settings, Structure};
+use crate::identify::hampel::Hampel;
+use crate::identify::quantity::Quantity;
+use crate::identify::savgol::SavGol;
+use crate::offline::identify::{Logs, Study, page, study, text, to_json};
+use crate::offline::output::{make_folder, write_whole};
+
+/// Dead times are looked for up to this share of the record…
+const DEAD_TIME_SHARE: f64 = 0.125;
+/// …and up to this \[s\], unless a range is told.
+const DEAD_TIME_S: f64 = 10.0;
+/// Share of the data that is kept to validate with.
+const VALIDATE_SHARE: f64 = 0.3;
+
+/// Finds a model of an extruder in logged data, and writes it as a file that a cell uses.
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Examples:
+  truebead identify --example example/
+  truebead identify example/log.csv --input screw_rpm --output flow_mm3_per_s \\
+      --validate example/other.csv --material PLA --nozzle-mm 0.4 --temperature-c 210
+
+The data are a table (CSV) with a line of names. The ends of the names tell the units:
+time_s or time_ms; _rpm, _mpa, _bar, _v, _mm3_per_s, _g_per_min and others (--unit
+names them where the column does not).
+
+Forms: fopdt is K (Tz s + 1) / (T s + 1) e^(-L s) without Tz, fopdt-zero with it;
+sopdt and sopdt-zero have K / (T^2 s^2 + 2 D T s + 1), sopdt-real and
+sopdt-real-zero K / ((T1 s + 1) (T2 s + 1)); 3,2 has three poles and two zeros.
+Several are compared; compare stands for fopdt, fopdt-zero, sopdt, sopdt-zero and 3,2.
+The one with the fewest parameters is taken that foretells the data to validate with
+as well as the best one.
+
+Exit status: 0 a model was found, 1 none that can be trusted, 2 wrong arguments.")]
+pub struct IdentifyArgs {
+    /// Table of logged data
+    #[arg(value_name = "DATA.csv", required_unless_present = "example")]
+    data: Option<PathBuf>,
+    #[command(flatten)]
+    columns: Columns,
+    /// Forms of the model: compare, fopdt, fopdt-zero, sopdt, sopdt-zero, sopdt-real,
+    /// sopdt-real-zero, or numbers of poles and zeros such as 2,1; may be repeated
+    #[arg(long, value_name = "FORM", value_parser = parse_forms, default_value = "compare")]
+    model: Vec<Forms>,
+    /// Dead time [s]: a number, a range to look in such as 0..3, or estimate
+    #[arg(long, value_name = "S", value_parser = parse_dead_time, default_value = "estimate")]
+    dead_time_s: Wanted,
+    /// Data to validate with, of the same columns
+    #[arg(long, value_name = "OTHER.csv", conflicts_with = "validate_share")]
+    validate: Option<PathBuf>,
+    /// Share at the end of the data that is kept to validate with; 0 for none
+    /// [default: 0.3]
+    #[arg(long, value_name = "SHARE")]
+    validate_share: Option<f64>,
+    /// The data begin at rest: the input had stood at its first value for long
+    #[arg(long)]
+    from_rest: bool,
+    /// Replace outliers of the output by the median of K samples to either side, where
+    /// they lie T standard deviations off it, such as 5,3
+    #[arg(long, value_name = "K,T", value_parser = parse_hampel)]
+    hampel: Option<Hampel>,
+    /// Smooth the output by polynomials of degree P through W samples, such as 11,3
+    #[arg(long, value_name = "W,P", value_parser = parse_smooth)]
+    smooth: Option<SavGol>,
+    /// Material that the model holds for
+    #[arg(long)]
+    material: Option<String>,
+    /// Diameter of the nozzle that it holds for [mm]
+    #[arg(long, value_name = "MM")]
+    nozzle_mm: Option<f64>,
+    /// Temperature of the material that it holds for [°C]
+    #[arg(long, value_name = "C")]
+    temperature_c: Option<f64>,
+    /// Folder for model.toml, report.html and identify.json
+    /// [default: model, or the first of model-2, model-3 … that is free]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write a log of a simulated extruder to this folder, to try it with
+    #[arg(long, value_name = "DIR", exclusive = true)]
+    example: Option<PathBuf>,
+}
+
+/// Forms that one word stands for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Forms(Vec<Structure>);
+
+/// A dead time that is told, or where it is looked for; none for the usual
+/// range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted(Option<DeadTime>);
+
+/// Runs the command; the answer goes to standard output.
+pub fn run(args: &IdentifyArgs) -> Result<()> {
+    if let Some(folder) = &args.example {
+        return example::write(folder);
+    }
+    let setting = args.setting()?;
+    let (logs, doubts) = args.logs()?;
+    let source = logs.source.clone();
+    let forms = args.forms(&logs.estimation);
+    let mut found = study(logs, &forms).with_context(|| source)?;
+    found.warnings.splice(0..0, doubts);
+    let folder = args.out.clone().unwrap_or_else(|| free_folder("model"));
+    say!("{}", text(&found).trim_end());
+    write(&found, setting, &folder)?;
+    say!("model      {}", folder.join("model.toml").display());
+    say!("report     {}", folder.join("report.html").display());
+    Ok(())
+}
+
+fn write(found: &Study, setting: Setting, folder: &std::path::Path) -> Result<()> {
+    make_folder(folder)?;
+    let notes = [
+        format!("Fitted by truebead {} to {}.", env!("CARGO_PKG_VERSION"), found.logs.source),
+        text(found),
+    ];
+    let model = to_toml(&found.model(setting), &notes);
+    write_whole(folder, "model.toml", model.as_bytes())?;
+    let json = serde_json::to_vec_pretty(&to_json(found)).context("identify.json")?;
+    write_whole(folder, "identify.json", &json)?;
+    write_whole(folder, "report.html", page(found).as_bytes())?;
+    Ok(())
+}
+
+impl IdentifyArgs {
+    fn setting(&self) -> Result<Setting, WrongArguments> {
+        let told = [
+            ("--nozzle-mm", self.nozzle_mm, 0.01..=1e3, "0.01 to 1000 mm"),
+            ("--temperature-c", self.temperature_c, -100.0..=2000.0, "-100 to 2000 °C"),
+        ];
+        for (name, value, range, expected) in told {
+            if let Some(value) = value.filter(|value| !range.contains(value)) {
+                return Err(WrongArguments::new(format!("{name} {value}: expected {expected}")));
+            }
+        }
+        Ok(Setting {
+            material: self.material.clone().filter(|name| !name.trim().is_empty()),
+            nozzle_mm: self.nozzle_mm,
+            temperature_c: self.temperature_c,
+        })
+    }
+
+    /// The data, and what is odd about their units.
+    fn logs(&self) -> Result<(Logs, Vec<String>)> {
+        let (Some(path), Some(input), Some(output)) =
+            (&self.data, &self.columns.input, &self.columns.output)
+        else {
+            return Err(WrongArguments::new("needs DATA.csv, --input and --output").into());
+        };
+        let filters = data::Filters { hampel: self.hampel, smooth: self.smooth };
+        let read = |path| data::read(path, &self.columns, &filters);
+        let (log, mut doubts) = read(path)?;
+        let source = path.display().to_string();
+        let share = self.validate_share.unwrap_or(VALIDATE_SHARE);
+        if !(0.0..=0.9).contains(&share) {
+            let what = format!("--validate-share {share}: expected 0 to 0.9");
+            return Err(WrongArguments::new(what).into());
+        }
+        let (estimation, validation) = match &self.validate {
+            Some(other) => {
+                let (rest, more) = read(other)?;
+                doubts.extend(
+                    more.into_iter().filter(|doubt| !doubts.contains(doubt)).collect::<Vec<_>>(),
+                );
+                (log, Some((rest, other.display().to_string())))
+            }
+            None if share > 0.0 => {
+                let (first, rest) = log.split(share).with_context(|| source.clone())?;
+                (first, Some((rest, source.clone())))
+            }
+            None => (log, None),
+        };
+        let quantity =
+            |column: &str| -> Result<Quantity, WrongArguments> { self.columns.quantity(column) };
+        let (input, output) = (quantity(input)?, quantity(output)?);
+        let from_rest = self.from_rest;
+        Ok((Logs { input, output, source, estimation, validation, from_rest }, doubts))
+    }
+
+    fn forms(&self, data: &Experiment) -> Vec<Settings> {
+        let most_s = (DEAD_TIME_SHARE * data.duration_s()).min(DEAD_TIME_S);
+        let dead_time = self.dead_time_s.0.unwrap_or(DeadTime::Estimated { least_s: 0.0, most_s });
+        let mut forms: Vec<Structure> = Vec::new();
+        for form in self.model.iter().flat_map(|forms| &forms.0) {
+            if !forms.contains(form) {
+                forms.push(*form);
+            }
+        }
+        forms.into_iter().map(|form| Settings::new(form, dead_time)).collect()
+    }
+}

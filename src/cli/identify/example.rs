@@ -1,0 +1,30 @@
+//! A log to try it with.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+
+use crate::offline::output::{make_folder, write_whole};
+use crate::sim::logged;
+
+/// Writes the logs of a simulated extruder.
+pub fn write(folder: &Path) -> Result<()> {
+    make_folder(folder)?;
+    let log = logged::binary().context("the example")?;
+    let other = logged::gaussian().context("the example")?;
+    write_whole(folder, "log.csv", log.to_csv().as_bytes())?;
+    write_whole(folder, "other.csv", other.to_csv().as_bytes())?;
+    let truth = logged::truth().context("the example")?;
+    let [log, other] = ["log.csv", "other.csv"].map(|name| folder.join(name).display().to_string());
+    say!("example    {log}: a binary sequence of the screw's speed, and the flow");
+    say!("           {other}: random levels, to validate with");
+    say!(
+        "truth      gain {:.2} mm³/s per rpm, damping 0.6, period 0.81 s, dead time {} s",
+        truth.dc_gain(),
+        truth.dead_time_s()
+    );
+    say!(
+        "try        truebead identify {log} --input screw_rpm --output flow_mm3_per_s --validate {other}"
+    );
+    Ok(())
+}

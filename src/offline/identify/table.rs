@@ -1,0 +1,166 @@
+//! What was found, as text.
+
+use std::fmt::Write;
+
+use super::{Study, form};
+use crate::identify::fit::{Fit, Row};
+
+/// A short table.
+pub fn text(study: &Study) -> String {
+    let mut text = String::new();
+    data(&mut text, study);
+    compared(&mut text, study);
+    parameters(&mut text, study);
+    quality(&mut text, study);
+    for warning in &study.warnings {
+        put(&mut text, "warning", warning);
+    }
+    text
+}
+
+fn put(text: &mut String, head: &str, line: &str) {
+    // Writing to a string cannot fail.
+    let _ = writeln!(text, "{}", format!("{head:<11}{line}").trim_end());
+}
+
+fn data(text: &mut String, study: &Study) {
+    let logs = &study.logs;
+    let described = |data: &crate::identify::experiment::Experiment| {
+        format!(
+            "{} samples, {:.1} s at {:.2} Hz from {:.2} s on",
+            data.len(),
+            data.duration_s(),
+            1.0 / data.step_s,
+            data.start_s
+        )
+    };
+    put(text, "data", &format!("{}: {}", logs.source, described(&logs.estimation)));
+    if let Some((validation, from)) = &logs.validation {
+        put(text, "validation", &format!("{from}: {}", described(validation)));
+    }
+    let held = if logs.estimation.input_is_held { ", held from sample to sample" } else { "" };
+    put(text, "input", &format!("{}{held}", logs.input));
+    put(text, "output", &logs.output.to_string());
+}
+
+fn compared(text: &mut String, study: &Study) {
+    let rows = &study.comparison.rows;
+    if rows.len() > 1 {
+        let line = format!(
+            "{:<11}{:>10}{:>10}{:>13}{:>12}",
+            "form", "parameters", "fit %", "validation %", "BIC"
+        );
+        put(text, "compared", &line);
+        for row in rows {
+            put(text, "", &one(row));
+        }
+        put(
+            text,
+            "chosen",
+            &format!("{}: {}", form(study.fit.settings.structure), study.comparison.reason),
+        );
+    } else {
+        put(text, "form", &form(study.fit.settings.structure));
+    }
+}
+
+fn one(row: &Row) -> String {
+    let name = form(row.settings.structure);
+    match &row.fit {
+        Err(why) => format!("{name:<11}{why}"),
+        Ok(fit) => {
+            let number = |value: Option<f64>, digits: usize| {
+                value.map_or_else(|| "–".to_owned(), |value| format!("{value:.digits$}"))
+            };
+            let loose = if fit.is_determined() { "" } else { "  not determined by the data" };
+            format!(
+                "{name:<11}{:>10}{:>10.2}{:>13}{:>12}{loose}",
+                fit.estimated,
+                fit.quality.fit_percent,
+                number(row.validation.map(|quality| quality.fit_percent), 2),
+                number(row.bic, 1)
+            )
+        }
+    }
+}
+
+fn parameters(text: &mut String, study: &Study) {
+    let fit = &study.fit;
+    let line = format!("{:<18}{:>12}{:>14}  {}", "", "value", "std. error", "unit");
+    put(text, "model", &line);
+    for one in &fit.parameters {
+        let [value, sigma] = [one.value, one.sigma].map(significant);
+        put(
+            text,
+            "",
+            &format!("{:<18}{value:>12}{sigma:>14}  {}", one.name, study.unit_of(&one.name)),
+        );
+    }
+    if fit.parameter("dead_time_s").is_none() {
+        let dead_time = format!(
+            "{:<18}{:>12}{:>14}  s",
+            "dead_time_s",
+            significant(fit.model.dead_time_s()),
+            "given"
+        );
+        put(text, "", &dead_time);
+    }
+    put(text, "", &transfer(fit));
+}
+
+/// The transfer function in one line.
+pub fn transfer(fit: &Fit) -> String {
+    let row = |row: &[f64]| {
+        let powers = (0..row.len()).rev();
+        let term = |(value, power): (&f64, usize)| match power {
+            0 => significant(*value),
+            1 => format!("{} s", significant(*value)),
+            _ => format!("{} s^{power}", significant(*value)),
+        };
+        row.iter().zip(powers).map(term).collect::<Vec<_>>().join(" + ")
+    };
+    let dead_time_s = fit.model.dead_time_s();
+    let dead_time = if dead_time_s > 0.0 {
+        format!(" e^(-{} s)", significant(dead_time_s))
+    } else {
+        String::new()
+    };
+    format!("({}) / ({}){dead_time}", row(fit.model.num()), row(fit.model.den()))
+        .replace("+ -", "- ")
+}
+
+/// Five significant digits.
+pub fn significant(value: f64) -> String {
+    let size = value.abs();
+    if size == 0.0 {
+        return "0".to_owned();
+    }
+    if !(1e-4..1e6).contains(&size) {
+        return format!("{value:.3e}");
+    }
+    let before = size.log10().floor();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 8")]
+    let places = (4.0 - before).clamp(0.0, 8.0) as usize;
+    format!("{value:.places$}")
+}
+
+fn quality(text: &mut String, study: &Study) {
+    let unit = study.logs.output.unit;
+    let own = study.fit.quality;
+    let line = format!(
+        "{:.2} % NRMSE, RMSE {} {unit}, MAE {} {unit}",
+        own.fit_percent,
+        significant(own.rmse),
+        significant(own.mae)
+    );
+    put(text, "fit", &line);
+    if let Some(other) = study.validation {
+        let line = format!(
+            "{:.2} % NRMSE, RMSE {} {unit}, MAE {} {unit}",
+            other.fit_percent,
+            significant(other.rmse),
+            significant(other.mae)
+        );
+        put(text, "validated", &line);
+    }
+}

@@ -1,0 +1,261 @@
+//! `truebead excite`, `identify` and `models`: from a profile to a model that a
+//! cell can look up, and what bad data are answered with.
+
+#![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use truebead::identify::file;
+use truebead::io::profile_file;
+use truebead::sim::logged;
+use truebead::time::Span;
+
+fn truebead(args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_truebead"));
+    command.args(args);
+    command
+}
+
+fn said(command: &mut Command, code: i32) -> String {
+    let run = command.assert().code(code);
+    let output = run.get_output();
+    let text = if code == 0 { &output.stdout } else { &output.stderr };
+    String::from_utf8_lossy(text).into_owned()
+}
+
+/// The command for a log in a folder, which finds one form quickly.
+fn identify(log: &Path, more: &[&str]) -> Command {
+    let columns = ["--input", "screw_rpm", "--output", "flow_mm3_per_s", "--model", "sopdt"];
+    let mut command = truebead(&["identify"]);
+    command.arg(log).args(columns).args(more);
+    command.arg("--out").arg(log.with_extension("out"));
+    command
+}
+
+/// A log of the simulated extruder, with its lines changed.
+fn log(folder: &Path, change: impl FnOnce(&mut Vec<String>)) -> PathBuf {
+    let mut lines: Vec<String> =
+        logged::binary().unwrap().to_csv().lines().map(str::to_owned).collect();
+    change(&mut lines);
+    let path = folder.join("log.csv");
+    fs::write(&path, lines.join("\n") + "\n").unwrap();
+    path
+}
+
+/// The answer to a log that no model can be found in.
+fn refused(change: impl FnOnce(&mut Vec<String>), more: &[&str]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let log = log(folder.path(), change);
+    let said = said(&mut identify(&log, more), 1);
+    assert!(said.starts_with("error: ") && said.contains("log.csv"), "{said}");
+    assert!(!log.with_extension("out").exists());
+    said
+}
+
+/// Every line after the names with its cells changed.
+fn each(lines: &mut [String], change: impl Fn(usize, [f64; 3]) -> [f64; 3]) {
+    for (k, line) in lines.iter_mut().skip(1).enumerate() {
+        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        let [time, rpm, flow] = change(k, [cells[0], cells[1], cells[2]]);
+        *line = format!("{time},{rpm},{flow}");
+    }
+}
+
+#[test]
+fn the_example_becomes_a_model_that_is_found_in_a_library() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let example = said(&mut truebead(&["identify", "--example", &at("example")]), 0);
+    assert!(example.contains("gain 19.05"), "{example}");
+    let answer = said(
+        &mut truebead(&[
+            "identify",
+            &at("example/log.csv"),
+            "--input",
+            "screw_rpm",
+            "--output",
+            "flow_mm3_per_s",
+            "--validate",
+            &at("example/other.csv"),
+            "--model",
+            "fopdt",
+            "--model",
+            "sopdt",
+            "--material",
+            "PLA",
+            "--nozzle-mm",
+            "0.4",
+            "--temperature-c",
+            "210",
+            "--out",
+            &at("models/pla"),
+        ]),
+        0,
+    );
+    for part in ["chosen     sopdt", "dead_time_s", "mm³/s per rpm", "validated", "model.toml"] {
+        assert!(answer.contains(part), "{part} in {answer}");
+    }
+    let json = fs::read_to_string(at("models/pla/identify.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert!((json["model"]["dc_gain"].as_f64().unwrap() - 19.05).abs() < 0.4);
+    assert_eq!(json["compared"].as_array().unwrap().len(), 2);
+    assert!(fs::read_to_string(at("models/pla/report.html")).unwrap().contains("<svg"));
+    let text = fs::read_to_string(at("models/pla/model.toml")).unwrap();
+    assert!(file::parse("model.toml", &text).unwrap().transfer.is_stable());
+    // In the library of a cell.
+    fs::write(at("models/pla-210.toml"), &text).unwrap();
+    fs::write(at("models/petg.toml"), text.replace("\"PLA\"", "\"PETG\"")).unwrap();
+    let list = said(&mut truebead(&["models", &at("models")]), 0);
+    assert!(list.contains("petg.toml") && list.contains("pla-210.toml"), "{list}");
+    let wanted = |temperature: &'static str| {
+        let look = ["--material", "pla", "--nozzle-mm", "0.4", "--temperature-c", temperature];
+        let mut command = truebead(&["models", &at("models")]);
+        command.args(look);
+        command
+    };
+    let found = said(&mut wanted("207"), 0);
+    assert!(found.contains("pla-210.toml") && found.contains("+3 °C off"), "{found}");
+    let absent = said(&mut wanted("230"), 1);
+    assert!(absent.contains("no model for pla") && absent.contains("petg.toml"), "{absent}");
+    fs::write(at("models/again.toml"), &text).unwrap();
+    let twice = said(&mut wanted("210"), 1);
+    assert!(twice.contains("2 models for pla") && twice.contains("again.toml"), "{twice}");
+    fs::write(at("models/wrong.toml"), text.replace("numerator", "nominator")).unwrap();
+    let wrong = said(&mut truebead(&["models", &at("models")]), 2);
+    assert!(wrong.contains("transfer.nominator: found an unknown key"), "{wrong}");
+}
+
+#[test]
+fn profiles_are_written_as_a_cell_plays_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("profile.csv");
+    let excite = |args: &str| {
+        let mut command = truebead(&["excite"]);
+        command.args(args.split(' ')).arg("--out").arg(&out);
+        command
+    };
+    let answer = said(
+        &mut excite(
+            "prbs --low 20 --high 40 --bit-s 0.7 --lead-in-s 5 --lead-out-s 3 --quantity screw_rpm",
+        ),
+        0,
+    );
+    assert!(answer.contains("129 values of screw_rpm, 96.9 s"), "{answer}");
+    assert!(answer.contains("20 to 40 rpm") && answer.contains("0.0112 to 0.633 Hz"), "{answer}");
+    let mut profile = profile_file::read(&out).unwrap();
+    let played = [4.9, 0.2, 90.9].map(|secs| {
+        profile.advance(Span::from_secs(secs));
+        profile.value()
+    });
+    assert_eq!(played, [30.0, 40.0, 30.0]);
+    let gaussian = "gaussian --low 2 --high 4 --hold-s 1.5 --duration-s 90 --quantity drive_v";
+    assert!(said(&mut excite(gaussian), 0).contains("60 values of drive_v, 90.0 s"));
+    let steps = "steps --levels 20,40,30 --hold-s 15 --quantity rpm";
+    assert!(said(&mut excite(steps), 0).contains("20 to 40 rpm"));
+    let unit = said(&mut excite("steps --levels 1,2 --hold-s 1 --quantity speed"), 2);
+    assert!(unit.contains("ends with its unit"), "{unit}");
+    let flat = said(&mut excite("prbs --low 4 --high 4 --hold-s 1 --quantity rpm"), 2);
+    assert!(flat.contains("levels from 4 to 4"), "{flat}");
+}
+
+#[test]
+fn cells_that_are_no_numbers_are_named_with_line_and_column() {
+    let said = refused(|lines| lines[411] = "8.20,35.000,NaN".to_owned(), &[]);
+    assert!(said.contains("line 412, column flow_mm3_per_s: found \"NaN\""), "{said}");
+    let said = refused(|lines| lines[411] = "8.20,off,530.1".to_owned(), &[]);
+    assert!(said.contains("line 412, column screw_rpm: found \"off\""), "{said}");
+}
+
+#[test]
+fn gaps_are_named_and_bridged_where_that_is_told() {
+    let cut = |lines: &mut Vec<String>| drop(lines.drain(1000..1050));
+    let said_so = refused(cut, &[]);
+    assert!(said_so.contains("line 1000: a gap of 1.020 s after 19.960 s"), "{said_so}");
+    assert!(said_so.contains("--max-gap-s"), "{said_so}");
+    let folder = tempfile::tempdir().unwrap();
+    let answer = said(&mut identify(&log(folder.path(), cut), &["--max-gap-s", "2"]), 0);
+    assert!(answer.contains("1 gap bridged by straight lines"), "{answer}");
+}
+
+#[test]
+fn time_that_falls_or_repeats_or_is_in_another_unit() {
+    let said_so = refused(|lines| lines[501] = lines[500].clone(), &[]);
+    assert!(said_so.contains("line 502: time repeats at sample 501"), "{said_so}");
+    let milliseconds = |lines: &mut Vec<String>| {
+        each(lines, |_, [time, rpm, flow]| [(time * 1000.0).round(), rpm, flow]);
+    };
+    let said_so = refused(milliseconds, &[]);
+    assert!(said_so.contains("steps. Is the column in ms?"), "{said_so}");
+    let folder = tempfile::tempdir().unwrap();
+    let told = log(folder.path(), milliseconds);
+    let answer = said(&mut identify(&told, &["--unit", "time_s=ms"]), 0);
+    assert!(answer.contains("at 50.00 Hz"), "{answer}");
+}
+
+#[test]
+fn columns_that_tell_nothing() {
+    let said = refused(|lines| each(lines, |_, [t, _, flow]| [t, 30.0, flow]), &[]);
+    assert!(said.contains("the input is 30 all the time"), "{said}");
+    let said = refused(|lines| each(lines, |_, [t, rpm, _]| [t, rpm, 540.0]), &[]);
+    assert!(said.contains("the output is 540 all the time"), "{said}");
+    let clipped = |lines: &mut Vec<String>| each(lines, |_, [t, r, flow]| [t, r, flow.min(570.0)]);
+    let said = refused(clipped, &[]);
+    assert!(said.contains("the output is cut off") && said.contains("570"), "{said}");
+    let said = refused(|lines| lines.truncate(40), &[]);
+    assert!(said.contains("39 samples: a model takes 50 or more"), "{said}");
+    let said = refused(|_| {}, &["--validate-share", "0.005"]);
+    assert!(said.contains("25 samples are left to validate with"), "{said}");
+}
+
+#[test]
+fn fits_that_cannot_be_trusted() {
+    // A flow that only ever grows with the screw's turns.
+    let said = refused(
+        |lines| {
+            let mut turns = 0.0;
+            for line in lines.iter_mut().skip(1) {
+                let cells: Vec<&str> = line.split(',').collect();
+                turns += cells[1].parse::<f64>().unwrap() - 25.0;
+                *line = format!("{},{},{turns}", cells[0], cells[1]);
+            }
+        },
+        &["--model", "fopdt"],
+    );
+    assert!(said.contains("no model can be trusted"), "{said}");
+    assert!(said.contains("edge of stability") || said.contains("does not determine"), "{said}");
+    // Numbers that have nothing to do with the input.
+    let noise = |k: usize| f64::from(u32::try_from(k * 7919 % 101).unwrap());
+    let said = refused(|lines| each(lines, |k, [t, r, _]| [t, r, noise(k)]), &[]);
+    assert!(said.contains("no model can be trusted:\n  sopdt: "), "{said}");
+}
+
+#[test]
+fn arguments_that_are_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = log(folder.path(), |_| {});
+    let other = |input: &str| {
+        let mut command = truebead(&["identify", log.to_str().unwrap()]);
+        command.args(["--input", input, "--output", "flow_mm3_per_s"]);
+        command
+    };
+    let columns = said(&mut other("screw"), 2);
+    assert!(
+        columns.contains("no column screw; the columns are time_s, screw_rpm, flow_mm3_per_s"),
+        "{columns}"
+    );
+    for (more, expected) in [
+        (["--model", "1,2"], "no more zeros than poles"),
+        (["--hampel", "0,3"], "half width of 0"),
+        (["--smooth", "10,3"], "odd number from 5"),
+        (["--unit", "screw_rpm=turns"], "expected one of rpm"),
+        (["--unit", "screw=rpm"], "--unit screw: no such column"),
+        (["--validate-share", "0.95"], "expected 0 to 0.9"),
+        (["--validate", "none.csv"], "none.csv"),
+        (["--nozzle-mm", "0"], "0.01 to 1000"),
+    ] {
+        let said = said(other("screw_rpm").args(more), 2);
+        assert!(said.contains(expected), "{more:?}: {said}");
+    }
+}
