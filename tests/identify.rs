@@ -8,9 +8,8 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use truebead::identify::file;
-use truebead::io::profile_file;
+use truebead::identify::profile::file::parse;
 use truebead::sim::logged;
-use truebead::time::Span;
 
 fn truebead(args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_truebead"));
@@ -144,12 +143,8 @@ fn profiles_are_written_as_a_cell_plays_them() {
     );
     assert!(answer.contains("129 values of screw_rpm, 96.9 s"), "{answer}");
     assert!(answer.contains("20 to 40 rpm") && answer.contains("0.0112 to 0.633 Hz"), "{answer}");
-    let mut profile = profile_file::read(&out).unwrap();
-    let played = [4.9, 0.2, 90.9].map(|secs| {
-        profile.advance(Span::from_secs(secs));
-        profile.value()
-    });
-    assert_eq!(played, [30.0, 40.0, 30.0]);
+    let (profile, _) = parse(&fs::read_to_string(&out).unwrap()).unwrap();
+    assert_eq!([profile.at(4.9), profile.at(5.1), profile.at(96.0)], [30.0, 40.0, 30.0]);
     let gaussian = "gaussian --low 2 --high 4 --hold-s 1.5 --duration-s 90 --quantity drive_v";
     assert!(said(&mut excite(gaussian), 0).contains("60 values of drive_v, 90.0 s"));
     let steps = "steps --levels 20,40,30 --hold-s 15 --quantity rpm";
