@@ -1,0 +1,172 @@
+//! The pressure loop: what speed of the screw keeps the pressure at the nozzle
+//! where it is wanted. Ma et al. 2026, with a law of our own beside theirs.
+//!
+//! ```text
+//!  target ──▶ law ──rpm──▶ limits ──▶ screw ··dead time, lag··▶ pressure
+//!              ▲                                                   │
+//!              └───────────────── readings, 50 Hz ─────────────────┘
+//! ```
+//!
+//! The rates are apart. [`PressureLaw::measured`] takes a reading whenever there is
+//! one; [`PressureLaw::step`] gives a command whenever one is due, 20 times a second
+//! in the paper; what a law foresees from its own commands is exact at any
+//! rate, so that a feedforward at 200 Hz is the same call made more often.
+//! Every law is a plain struct that is given the time, allocates nothing in
+//! these two calls and never leaves its [`Limits`].
+
+use crate::time::{Span, Stamp};
+use crate::units::{MPa, Rpm};
+
+pub mod bank;
+pub mod belief;
+pub mod calls;
+pub mod history;
+pub mod jump;
+pub mod kalman;
+pub mod limits;
+pub mod pi;
+pub mod predictive;
+pub mod reference;
+pub mod smith;
+pub mod tuning;
+pub mod vsfc;
+pub mod zone;
+
+#[cfg(test)]
+mod tests;
+
+pub use calls::Running;
+pub use limits::{Command, Limit, Limits};
+
+/// The longest dead time and lag that are taken \[s\].
+pub const LONGEST_S: f64 = 60.0;
+
+/// Settings that cannot be.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum PressureError {
+    /// A setting outside its range.
+    #[error("{what} is {found}: it must be {wanted}")]
+    OutOfRange {
+        /// Name of the setting, with its unit.
+        what: &'static str,
+        /// What was given.
+        found: f64,
+        /// What it must be.
+        wanted: &'static str,
+    },
+    /// Limits that leave nothing between them.
+    #[error("the screw's speed is limited to {min} … {max}: the first must be below the second")]
+    Limits {
+        /// Lower limit.
+        min: Rpm,
+        /// Upper limit.
+        max: Rpm,
+    },
+    /// Too little to tell the noise from.
+    #[error("the noise was to be told from {found} readings: at least {wanted} are needed")]
+    TooFew {
+        /// Readings that were given.
+        found: usize,
+        /// How many are needed.
+        wanted: usize,
+    },
+    /// Readings that never change, or that tell no noise.
+    #[error(
+        "the readings tell no noise (their changes have a variance of {variance} MPa²): \
+         a sensor that is stuck, or readings that were smoothed before"
+    )]
+    NoNoise {
+        /// Variance of the change from one reading to the next \[MPa²\].
+        variance: f64,
+    },
+}
+
+/// A reading that a law does not take.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Refused {
+    /// Older than what the law knows already.
+    #[error("a reading is {late_s} s older than the last one")]
+    Late {
+        /// By how much \[s\].
+        late_s: f64,
+    },
+    /// Beyond what the machine could have.
+    #[error("the pressure reads {found}: at most ±{most} can be; check the sensor and its scale")]
+    Implausible {
+        /// What was read.
+        found: MPa,
+        /// The largest size that is taken.
+        most: MPa,
+    },
+}
+
+/// First-order lag with dead time, K·e^(−Ls)/(τs + 1), from the screw's speed
+/// to the pressure at the nozzle. Ma et al. 2026, eq. (7).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fopdt {
+    gain: f64,
+    lag_s: f64,
+    dead_time_s: f64,
+}
+
+impl Fopdt {
+    /// From the gain \[MPa/rpm\], the lag and the dead time \[s\]. Fails on a
+    /// gain or a lag that is not positive and on times over [`LONGEST_S`].
+    pub fn new(gain_mpa_per_rpm: f64, lag_s: f64, dead_time_s: f64) -> Result<Self, PressureError> {
+        within("the gain [MPa/rpm]", gain_mpa_per_rpm, 1e-9..=1e9, "between 1e-9 and 1e9")?;
+        within("the lag [s]", lag_s, 1e-3..=LONGEST_S, "between 0.001 and 60")?;
+        within("the dead time [s]", dead_time_s, 0.0..=LONGEST_S, "between 0 and 60")?;
+        Ok(Self { gain: gain_mpa_per_rpm, lag_s, dead_time_s })
+    }
+
+    /// Pressure for each rpm, once settled \[MPa/rpm\].
+    pub const fn gain(&self) -> f64 {
+        self.gain
+    }
+
+    /// Time constant of the lag \[s\].
+    pub const fn lag_s(&self) -> f64 {
+        self.lag_s
+    }
+
+    /// Dead time \[s\].
+    pub const fn dead_time_s(&self) -> f64 {
+        self.dead_time_s
+    }
+}
+
+/// A law of the pressure loop.
+pub trait PressureLaw {
+    /// Takes a reading of the pressure at the nozzle. Refuses one that is
+    /// older than the last or beyond anything the machine could have, and is
+    /// then as if it had not been.
+    fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), Refused>;
+
+    /// The command from now on. `target` is what is wanted [`Self::lead`]
+    /// ahead where that is known, and what is wanted now where it is not. A
+    /// call that is not after the last one gives that one's command again.
+    fn step(&mut self, now: Stamp, target: MPa) -> Command;
+
+    /// Learns that something else than its last command went to the screw from
+    /// `now` on, where other limits than its own shaped it.
+    fn settle(&mut self, now: Stamp, applied: Rpm);
+
+    /// How far ahead the law would like to know the target.
+    fn lead(&self) -> Span {
+        Span::ZERO
+    }
+}
+
+/// Whether a number is within a range, as an error where it is not.
+fn within(
+    what: &'static str,
+    found: f64,
+    range: std::ops::RangeInclusive<f64>,
+    wanted: &'static str,
+) -> Result<(), PressureError> {
+    if range.contains(&found) {
+        Ok(())
+    } else {
+        Err(PressureError::OutOfRange { what, found, wanted })
+    }
+}

@@ -1,0 +1,177 @@
+//! Commands of the last while and what a lag makes of them, exactly: a command
+//! holds until the next, so the lag is known in closed form at any moment, and
+//! a dead time is a moment further back. It need be no multiple of any step.
+
+use super::Fopdt;
+
+/// Commands a second that are kept over the longest delay that is asked for.
+const HZ: f64 = 250.0;
+
+/// A command from a moment on, and the lags at that moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Entry {
+    at_s: f64,
+    /// Gain times command \[MPa\].
+    drive: f64,
+    lags: Lags,
+}
+
+/// One lag of the commands, and a second one of the first, both \[MPa\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lags {
+    /// The pressure of a process with lag and gain and no dead time.
+    pub first: f64,
+    /// The same once more through the lag.
+    pub second: f64,
+}
+
+impl Lags {
+    /// After `dt_s` under a steady drive (zero-order hold, closed form).
+    fn after(self, drive: f64, dt_s: f64, lag_s: f64) -> Self {
+        let x = dt_s.max(0.0) / lag_s;
+        let kept = libm::exp(-x);
+        let (first, second) = (self.first - drive, self.second - drive);
+        Self { first: drive + first * kept, second: drive + (second + first * x) * kept }
+    }
+}
+
+/// What holds at a moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// Gain times the command that was in force just before \[MPa\].
+    pub drive: f64,
+    /// The lags.
+    pub lags: Lags,
+}
+
+/// The commands of the last while.
+#[derive(Debug, Clone, PartialEq)]
+pub struct History {
+    gain: f64,
+    lag_s: f64,
+    /// A ring; the newest is at `newest`.
+    ring: Vec<Entry>,
+    newest: usize,
+}
+
+impl History {
+    /// As if `speed_rpm` had been commanded for ever. Keeps what is needed to
+    /// look back by `back_s`.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "at most 60 s at 250 a second, some times over"
+    )]
+    pub fn new(model: &Fopdt, back_s: f64, speed_rpm: f64) -> Self {
+        let drive = model.gain() * speed_rpm;
+        let lags = Lags { first: drive, second: drive };
+        let entry = Entry { at_s: f64::NEG_INFINITY, drive, lags };
+        let kept = (back_s.clamp(0.0, 1e3) * HZ).ceil() as usize + 2;
+        Self { gain: model.gain(), lag_s: model.lag_s(), ring: vec![entry; kept], newest: 0 }
+    }
+
+    /// A command from `at_s` on; not before the last one.
+    pub fn push(&mut self, at_s: f64, speed_rpm: f64) {
+        let drive = self.gain * speed_rpm;
+        let last = self.entry(0);
+        if drive == last.drive || at_s < last.at_s {
+            return;
+        }
+        let lags = self.at(at_s).lags;
+        if at_s > last.at_s {
+            self.newest = (self.newest + 1) % self.ring.len();
+        }
+        let newest = self.newest;
+        if let Some(entry) = self.ring.get_mut(newest) {
+            *entry = Entry { at_s, drive, lags };
+        }
+    }
+
+    /// What holds at a moment. Before all that is kept, the earliest.
+    pub fn at(&self, at_s: f64) -> Moment {
+        let mut age = 0;
+        // The command in force just before: one that begins now does not count.
+        while age + 1 < self.ring.len() && self.entry(age).at_s >= at_s {
+            age += 1;
+        }
+        let entry = self.entry(age);
+        let dt_s = if entry.at_s.is_finite() { at_s - entry.at_s } else { 0.0 };
+        Moment { drive: entry.drive, lags: entry.lags.after(entry.drive, dt_s, self.lag_s) }
+    }
+
+    /// The entry that many places before the newest.
+    fn entry(&self, age: usize) -> Entry {
+        let kept = self.ring.len();
+        let at = (self.newest + kept - age % kept) % kept;
+        self.ring.get(at).copied().unwrap_or(Entry {
+            at_s: f64::NEG_INFINITY,
+            drive: 0.0,
+            lags: Lags { first: 0.0, second: 0.0 },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn model() -> Fopdt {
+        Fopdt::new(2.0, 0.84, 0.41).unwrap()
+    }
+
+    #[test]
+    fn a_step_is_the_closed_form_at_any_moment() {
+        let mut history = History::new(&model(), 1.0, 0.0);
+        history.push(1.0, 0.3);
+        for dt in [0.0, 0.001, 0.41, 0.4137, 2.0] {
+            let x = dt / 0.84;
+            let found = history.at(1.0 + dt).lags;
+            assert!((found.first - 0.6 * (1.0 - f64::exp(-x))).abs() < 1e-14, "{dt}");
+            assert!((found.second - 0.6 * (1.0 - (1.0 + x) * f64::exp(-x))).abs() < 1e-14);
+        }
+        assert_eq!(history.at(0.9).lags.first, 0.0);
+    }
+
+    #[test]
+    fn many_short_commands_are_the_sum_of_their_steps() {
+        let mut history = History::new(&model(), 2.0, 0.5);
+        let commands: Vec<(f64, f64)> =
+            (0..150).map(|i| (f64::from(i) * 0.013, f64::from(i * 7 % 11) * 0.1)).collect();
+        for (at, speed) in &commands {
+            history.push(*at, *speed);
+        }
+        for t in [0.2, 0.613, 1.1, 1.93, 2.5] {
+            let mut expected = 1.0;
+            let mut last = 0.5;
+            for (at, speed) in commands.iter().filter(|(at, _)| *at < t) {
+                expected += 2.0 * (speed - last) * (1.0 - f64::exp(-(t - at) / 0.84));
+                last = *speed;
+            }
+            assert!((history.at(t).lags.first - expected).abs() < 1e-12, "{t}");
+        }
+    }
+
+    #[test]
+    fn a_ring_that_went_round_still_knows_its_span() {
+        let mut history = History::new(&model(), 0.5, 0.0);
+        let mut all = History::new(&model(), 100.0, 0.0);
+        for i in 0..5000 {
+            let (at, speed) = (f64::from(i) * 0.005, f64::from(i % 13));
+            history.push(at, speed);
+            all.push(at, speed);
+        }
+        for back in [0.0, 0.1, 0.4999] {
+            let t = 25.0 - back;
+            assert!((history.at(t).lags.first - all.at(t).lags.first).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_second_command_at_the_same_moment_replaces_the_first() {
+        let mut history = History::new(&model(), 1.0, 0.0);
+        history.push(1.0, 5.0);
+        history.push(1.0, 0.3);
+        history.push(0.5, 9.0);
+        assert!((history.at(1.84).lags.first - 0.6 * (1.0 - f64::exp(-1.0))).abs() < 1e-14);
+    }
+}

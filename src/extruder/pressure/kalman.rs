@@ -1,0 +1,178 @@
+//! Kalman's filter (1960) of a pressure that wanders, and the noise it needs,
+//! from readings. Ma et al. 2026, section 2.3.
+
+use super::{PressureError, within};
+use crate::units::MPa;
+
+/// Fewest readings that a noise is told from: its variance is then known to
+/// about a tenth.
+pub const FEWEST_READINGS: usize = 200;
+
+/// How a pressure wanders and how its readings scatter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    wander: f64,
+    reading: f64,
+}
+
+impl Noise {
+    /// From the variance of the wandering from one reading to the next and
+    /// that of a reading \[MPa²\].
+    pub fn new(wander_mpa2: f64, reading_mpa2: f64) -> Result<Self, PressureError> {
+        within("the wandering's variance [MPa²]", wander_mpa2, 0.0..=1e6, "between 0 and 1e6")?;
+        let wanted = "above 1e-18 and at most 1e6";
+        within("the readings' variance [MPa²]", reading_mpa2, 1e-18..=1e6, wanted)?;
+        Ok(Self { wander: wander_mpa2, reading: reading_mpa2 })
+    }
+
+    /// From readings at a steady command. A random walk under white noise
+    /// changes from reading to reading with the variance q + 2r, and
+    /// neighbouring changes have the covariance −r. Needs
+    /// [`FEWEST_READINGS`], and fails on readings that show no noise.
+    pub fn identify(readings: &[MPa]) -> Result<Self, PressureError> {
+        let found = readings.len();
+        if found < FEWEST_READINGS {
+            return Err(PressureError::TooFew { found, wanted: FEWEST_READINGS });
+        }
+        let changes: Vec<f64> =
+            readings.windows(2).map(|pair| pair[1].get() - pair[0].get()).collect();
+        let variance = mean(changes.iter().map(|change| change * change));
+        let reading = -mean(changes.windows(2).map(|pair| pair[0] * pair[1]));
+        if !(variance > 0.0 && reading > 0.01 * variance) {
+            return Err(PressureError::NoNoise { variance });
+        }
+        Self::new((variance - 2.0 * reading).max(0.0), reading)
+    }
+
+    /// Standard deviation of a reading.
+    pub fn sigma(&self) -> MPa {
+        MPa::new(self.reading.sqrt()).unwrap_or_default()
+    }
+
+    /// Variance of a reading \[MPa²\].
+    pub const fn reading_mpa2(&self) -> f64 {
+        self.reading
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a count of readings")]
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len().max(1) as f64;
+    values.sum::<f64>() / count
+}
+
+/// The filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kalman {
+    noise: Noise,
+    estimate: f64,
+    variance: f64,
+    /// Mean square of the innovations, forgotten over some hundred readings.
+    innovation: Option<f64>,
+}
+
+/// Share that a new innovation has in their mean square.
+const SHARE: f64 = 0.01;
+
+impl Kalman {
+    /// Starts at a pressure that is known as well as a reading.
+    pub fn new(noise: Noise, pressure: MPa) -> Self {
+        Self { noise, estimate: pressure.get(), variance: noise.reading, innovation: None }
+    }
+
+    /// Takes a reading, and gives the pressure \[MPa\].
+    pub fn step(&mut self, reading: MPa) -> f64 {
+        let predicted = self.variance + self.noise.wander;
+        let gain = predicted / (predicted + self.noise.reading);
+        let innovation = reading.get() - self.estimate;
+        let square = innovation * innovation;
+        let last = self.innovation.unwrap_or(square);
+        self.innovation = Some(last + SHARE * (square - last));
+        self.estimate += gain * innovation;
+        self.variance = (1.0 - gain) * predicted;
+        self.estimate
+    }
+
+    /// The pressure \[MPa\].
+    pub const fn pressure(&self) -> f64 {
+        self.estimate
+    }
+
+    /// Variance of the innovations as they came \[MPa²\]; none before the
+    /// first. Far from [`Self::foretold_innovation`] the noise is another than
+    /// was set.
+    pub const fn innovation(&self) -> Option<f64> {
+        self.innovation
+    }
+
+    /// Variance that the innovations should have with this noise \[MPa²\].
+    pub fn foretold_innovation(&self) -> f64 {
+        self.variance + self.noise.wander + self.noise.reading
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::hash::{mix, normal_pair};
+
+    const Q: f64 = 2e-5;
+    const R: f64 = 4.98e-5;
+
+    fn readings(q: f64, r: f64, count: u64) -> Vec<MPa> {
+        let mut pressure = 0.6;
+        (0..count)
+            .map(|i| {
+                let [a, b] = normal_pair(mix(&[42, i]));
+                pressure += q.sqrt() * a;
+                MPa::constant(pressure + r.sqrt() * b)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_gain_settles_where_the_riccati_equation_says() {
+        let mut kalman = Kalman::new(Noise::new(Q, R).unwrap(), MPa::ZERO);
+        for _ in 0..200 {
+            kalman.step(MPa::ZERO);
+        }
+        let predicted = Q / 2.0 + (Q * Q / 4.0 + Q * R).sqrt();
+        let before = kalman.pressure();
+        kalman.step(MPa::constant(1.0));
+        let expected = predicted / (predicted + R);
+        assert!((kalman.pressure() - before - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_noise_is_told_from_readings() {
+        let found = Noise::identify(&readings(Q, R, 20_000)).unwrap();
+        // Four standard errors of a covariance of neighbours.
+        assert!((found.reading / R - 1.0).abs() < 0.08, "{found:?}");
+        assert!((found.wander / Q - 1.0).abs() < 0.2, "{found:?}");
+        assert!((found.sigma().get() - 0.007_06).abs() < 3e-4);
+    }
+
+    #[test]
+    fn innovations_show_whether_the_noise_is_the_one_that_was_set() {
+        for (times, least, most) in [(1.0, 0.8, 1.25), (4.0, 2.0, 5.0)] {
+            let mut kalman = Kalman::new(Noise::new(Q, R).unwrap(), MPa::constant(0.6));
+            for reading in readings(Q, R * times, 2000) {
+                kalman.step(reading);
+            }
+            let ratio = kalman.innovation().unwrap() / kalman.foretold_innovation();
+            assert!((least..most).contains(&ratio), "{times}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn readings_that_tell_no_noise_are_refused() {
+        let stuck = [MPa::constant(0.6); 300];
+        assert!(matches!(Noise::identify(&stuck), Err(PressureError::NoNoise { .. })));
+        let ramp: Vec<MPa> = (0..300).map(|i| MPa::constant(f64::from(i) * 0.001)).collect();
+        assert!(matches!(Noise::identify(&ramp), Err(PressureError::NoNoise { .. })));
+        let few = Noise::identify(&stuck[..10]);
+        assert_eq!(few, Err(PressureError::TooFew { found: 10, wanted: FEWEST_READINGS }));
+        assert!(Noise::new(Q, 0.0).is_err());
+        assert!(Noise::new(f64::NAN, R).is_err());
+    }
+}

@@ -1,0 +1,99 @@
+//! Proportional-integral law with back-calculation: what a limit takes from a
+//! command is led back into the integral (Åström and Hägglund 2006, 3.5). What
+//! Ma et al. 2026 compare their law with.
+
+use super::calls::{Calls, Running, sane};
+use super::kalman::{Kalman, Noise};
+use super::{Command, Limits, PressureError, PressureLaw, Refused, within};
+use crate::time::Stamp;
+use crate::units::{MPa, Rpm};
+
+/// Gains of the law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PiGains {
+    kp: f64,
+    ki: f64,
+    tracking_s: f64,
+}
+
+impl PiGains {
+    /// The setting that gives the published overshoot and rise (fitted; the
+    /// paper names none), for a gain of the process of 1 MPa/rpm.
+    pub const MA2026: Self = Self { kp: 1.5, ki: 1.5, tracking_s: 1.0 };
+
+    /// From the proportional gain \[rpm/MPa\], the integral time \[s\] and the
+    /// time in which what a limit took is forgotten \[s\].
+    pub fn new(kp: f64, integral_s: f64, tracking_s: f64) -> Result<Self, PressureError> {
+        let wanted = "above 1e-3 and at most 1e6";
+        within("the proportional gain [rpm/MPa]", kp, 0.0..=1e9, "between 0 and 1e9")?;
+        within("the integral time [s]", integral_s, 1e-3..=1e6, wanted)?;
+        within("the tracking time [s]", tracking_s, 1e-3..=1e6, wanted)?;
+        Ok(Self { kp, ki: kp / integral_s, tracking_s })
+    }
+
+    /// Speed for each MPa of error \[rpm/MPa\].
+    pub const fn kp(&self) -> f64 {
+        self.kp
+    }
+
+    /// Speed gathered each second for each MPa of error \[rpm/(MPa·s)\].
+    pub const fn ki(&self) -> f64 {
+        self.ki
+    }
+
+    /// Time in which what a limit took is forgotten \[s\].
+    pub const fn tracking_s(&self) -> f64 {
+        self.tracking_s
+    }
+}
+
+/// The law with its memory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pi {
+    gains: PiGains,
+    limits: Limits,
+    kalman: Kalman,
+    integral: f64,
+    /// The last error \[MPa\] and what the law would have liked for it \[rpm\].
+    error: f64,
+    demand: f64,
+    calls: Calls,
+}
+
+impl Pi {
+    /// Takes over from what runs, without a bump.
+    pub fn new(gains: PiGains, noise: Noise, limits: Limits, running: Running) -> Self {
+        let error = running.target.get() - running.pressure.get();
+        Self {
+            gains,
+            limits,
+            kalman: Kalman::new(noise, running.pressure),
+            integral: running.speed.get() - gains.kp * error,
+            error: 0.0,
+            demand: running.speed.get(),
+            calls: Calls::new(running.speed),
+        }
+    }
+}
+
+impl PressureLaw for Pi {
+    fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), Refused> {
+        self.calls.read(now, pressure)?;
+        self.kalman.step(pressure);
+        Ok(())
+    }
+
+    fn step(&mut self, now: Stamp, target: MPa) -> Command {
+        let Some(dt_s) = self.calls.begin(now) else { return self.calls.last() };
+        let lost = self.calls.last().speed.get() - self.demand;
+        let gathers = self.gains.ki * self.error + lost / self.gains.tracking_s;
+        self.integral = sane(self.integral + gathers * dt_s);
+        self.error = target.get() - self.kalman.pressure();
+        self.demand = sane(self.gains.kp * self.error + self.integral);
+        self.calls.command(&self.limits, self.demand, dt_s)
+    }
+
+    fn settle(&mut self, _now: Stamp, applied: Rpm) {
+        self.calls.settle(applied);
+    }
+}

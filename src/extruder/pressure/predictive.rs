@@ -1,0 +1,125 @@
+//! This program's own law. Two degrees of freedom: a reference that lags
+//! behind the target, driven through the inverse of the model, and feedback on
+//! the pressure that is foretold a dead time ahead. Load and errors of the
+//! model are observed together ([`super::bank`]), so that neither is mistaken
+//! for the other; corrections within the noise are made in part
+//! ([`super::zone`]); on its way to a target what the pressure *may* be is kept
+//! from passing it. Nothing is integrated in the law, so nothing winds up: the
+//! observer is told what was commanded, limits and all.
+
+use super::bank::{Bank, Foretold};
+use super::calls::{Calls, Running};
+use super::history::History;
+use super::reference::{Reference, Way};
+use super::tuning::Tuning;
+use super::{Command, Fopdt, Limits, PressureLaw, Refused};
+use crate::time::{Span, Stamp};
+use crate::units::{MPa, Rpm};
+
+/// The law with its memory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Predictive {
+    model: Fopdt,
+    tuning: Tuning,
+    limits: Limits,
+    history: History,
+    bank: Bank,
+    reference: Reference,
+    calls: Calls,
+    /// How much of what ran before is still kept in place of the tunnel.
+    kept: f64,
+}
+
+impl Predictive {
+    /// Takes over from what runs, without a bump: what the pressure differs
+    /// from the model is taken for a load.
+    pub fn new(model: Fopdt, tuning: Tuning, limits: Limits, running: Running) -> Self {
+        let speed = running.speed.get();
+        let load = running.pressure.get() - model.gain() * speed;
+        Self {
+            model,
+            tuning,
+            limits,
+            history: History::new(&model, Bank::back_s(&model, &tuning), speed),
+            bank: Bank::new(&model, tuning, load),
+            reference: Reference::new(tuning.reference_s, model.lag_s(), running),
+            calls: Calls::new(running.speed),
+            kept: 1.0,
+        }
+    }
+
+    /// What is known of the process and where it is going, as of `now`.
+    pub fn foretold(&self, now: Stamp) -> Foretold {
+        self.bank.foretell(&self.history.at(now.secs()).lags)
+    }
+
+    /// The dead time as far as it is known \[s\].
+    pub fn dead_time_s(&self) -> f64 {
+        self.bank.dead_s()
+    }
+
+    /// How many steps of the load have been taken for real.
+    pub const fn jumps(&self) -> u64 {
+        self.bank.jumps()
+    }
+
+    /// The drive \[MPa\] that brings a foretold pressure to another in the time
+    /// until the next command.
+    fn drive(&self, foretold: &Foretold, wanted: f64, period_s: f64) -> f64 {
+        let kept = libm::exp(-period_s / (self.model.lag_s() * foretold.lag));
+        ((wanted - kept * foretold.pressure) / (1.0 - kept) - foretold.load) / foretold.gain
+    }
+
+    /// What is left uncorrected of the load and of the gain's error \[MPa\].
+    fn tolerated(&self, foretold: &Foretold, target: f64) -> f64 {
+        let needed = (target - foretold.load) / foretold.gain - target;
+        (self.tuning.zone.made(needed) - needed) * foretold.gain * (1.0 - self.kept)
+    }
+
+    /// The drive that keeps what the pressure may be from passing the target;
+    /// none where the reference has arrived.
+    fn bound(&self, foretold: &Foretold, way: &Way) -> Option<(f64, f64)> {
+        let to_go = way.target - way.from;
+        if to_go.abs() <= self.tuning.sigma() {
+            return None;
+        }
+        let sign = to_go.signum();
+        let may_be = foretold.higher(sign * self.tuning.caution);
+        let top = way.target + sign * self.tuning.margin;
+        Some((sign, self.drive(&may_be, top, way.period_s)))
+    }
+}
+
+impl PressureLaw for Predictive {
+    fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), Refused> {
+        let dt_s = self.calls.read(now, pressure)?;
+        self.bank.read(&self.history, now.secs(), dt_s, pressure.get());
+        Ok(())
+    }
+
+    fn step(&mut self, now: Stamp, target: MPa) -> Command {
+        let Some(dt_s) = self.calls.begin(now) else { return self.calls.last() };
+        self.kept *= libm::exp(-dt_s / self.tuning.return_s);
+        let way = self.reference.step(target.get(), dt_s);
+        let foretold = self.foretold(now);
+        let left = self.tolerated(&foretold, way.target);
+        let closing = libm::exp(-way.period_s / self.tuning.feedback_s);
+        let wanted = way.to + left + closing * (foretold.pressure - way.from - left);
+        let mut drive = self.drive(&foretold, wanted, way.period_s);
+        if let Some((sign, bound)) = self.bound(&foretold, &way) {
+            drive = sign * (sign * drive).min(sign * bound);
+        }
+        let command = self.calls.command(&self.limits, drive / self.model.gain(), dt_s);
+        self.history.push(now.secs(), command.speed.get());
+        command
+    }
+
+    fn settle(&mut self, now: Stamp, applied: Rpm) {
+        self.calls.settle(applied);
+        self.history.push(now.secs(), applied.get());
+    }
+
+    fn lead(&self) -> Span {
+        Span::from_secs(self.bank.dead_s() + self.reference.lead_s())
+    }
+}

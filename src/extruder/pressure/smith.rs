@@ -1,0 +1,111 @@
+//! Smith's predictor (1957), and a proportional-integral law on what it
+//! foretells: the pressure that is read, less what the commands under way have
+//! not yet done to it. Ma et al. 2026, eq. (8).
+
+use super::calls::{Calls, Running, sane};
+use super::history::History;
+use super::kalman::{Kalman, Noise};
+use super::pi::PiGains;
+use super::reference::Reference;
+use super::{Command, Fopdt, Limits, PressureLaw, Refused};
+use crate::time::Stamp;
+use crate::units::{MPa, Rpm};
+
+/// What the commands under way are about to do, from the model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Smith {
+    history: History,
+    dead_time_s: f64,
+}
+
+impl Smith {
+    /// As if the speed had been commanded for ever.
+    pub fn new(model: &Fopdt, speed_rpm: f64) -> Self {
+        let dead_time_s = model.dead_time_s();
+        Self { history: History::new(model, dead_time_s, speed_rpm), dead_time_s }
+    }
+
+    /// By how much the pressure will have changed a dead time from now
+    /// \[MPa\].
+    pub fn under_way(&self, now: Stamp) -> f64 {
+        let at_s = now.secs();
+        let then = self.history.at(at_s - self.dead_time_s).lags.first;
+        self.history.at(at_s).lags.first - then
+    }
+
+    /// Takes note of a command from now on.
+    pub fn commanded(&mut self, now: Stamp, speed: Rpm) {
+        self.history.push(now.secs(), speed.get());
+    }
+}
+
+/// Two degrees of freedom: the inverse of the model's lag along a reference
+/// that lags behind the target, and a proportional-integral law on how far the
+/// predicted pressure is from that reference.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SmithPi {
+    model: Fopdt,
+    gains: PiGains,
+    limits: Limits,
+    kalman: Kalman,
+    smith: Smith,
+    reference: Reference,
+    integral: f64,
+    error: f64,
+    demand: f64,
+    calls: Calls,
+}
+
+impl SmithPi {
+    /// Takes over from what runs, without a bump. The reference lags behind
+    /// the target by `reference_s`.
+    pub fn new(
+        model: Fopdt,
+        gains: PiGains,
+        reference_s: f64,
+        noise: Noise,
+        limits: Limits,
+        running: Running,
+    ) -> Self {
+        let steady = running.pressure.get() / model.gain();
+        Self {
+            model,
+            gains,
+            limits,
+            kalman: Kalman::new(noise, running.pressure),
+            smith: Smith::new(&model, running.speed.get()),
+            reference: Reference::new(reference_s, model.lag_s(), running),
+            integral: running.speed.get() - steady,
+            error: 0.0,
+            demand: running.speed.get(),
+            calls: Calls::new(running.speed),
+        }
+    }
+}
+
+impl PressureLaw for SmithPi {
+    fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), Refused> {
+        self.calls.read(now, pressure)?;
+        self.kalman.step(pressure);
+        Ok(())
+    }
+
+    fn step(&mut self, now: Stamp, target: MPa) -> Command {
+        let Some(dt_s) = self.calls.begin(now) else { return self.calls.last() };
+        let lost = self.calls.last().speed.get() - self.demand;
+        let gathers = self.gains.ki() * self.error + lost / self.gains.tracking_s();
+        self.integral = sane(self.integral + gathers * dt_s);
+        let way = self.reference.step(target.get(), dt_s);
+        self.error = way.from - (self.kalman.pressure() + self.smith.under_way(now));
+        let feedforward = way.drive(self.model.lag_s()) / self.model.gain();
+        self.demand = sane(feedforward + self.gains.kp() * self.error + self.integral);
+        let command = self.calls.command(&self.limits, self.demand, dt_s);
+        self.smith.commanded(now, command.speed);
+        command
+    }
+
+    fn settle(&mut self, now: Stamp, applied: Rpm) {
+        self.calls.settle(applied);
+        self.smith.commanded(now, applied);
+    }
+}

@@ -1,0 +1,239 @@
+//! What every law of the loop must keep, and what ours learns.
+
+use proptest::prelude::*;
+
+use super::kalman::Noise;
+use super::pi::{Pi, PiGains};
+use super::predictive::Predictive;
+use super::smith::SmithPi;
+use super::tuning::Tuning;
+use super::vsfc::{Vsfc, VsfcGains};
+use super::*;
+use crate::sim::pressure::{Disturbed, Plant};
+use crate::units::{MPa, Rpm};
+
+const FASTEST: Rpm = Rpm::constant(3.0);
+const PERIOD: Span = Span::from_millis(50);
+
+fn model() -> Fopdt {
+    Fopdt::new(1.0, 0.84, 0.41).unwrap()
+}
+
+fn noise() -> Noise {
+    Noise::new(2e-5, 4.98e-5).unwrap()
+}
+
+fn ours(limits: Limits, running: Running) -> Predictive {
+    let tuning = Tuning::of(&model(), &noise(), 0.1).unwrap();
+    Predictive::new(model(), tuning, limits, running)
+}
+
+fn laws(limits: Limits, running: Running) -> [(&'static str, Box<dyn PressureLaw>); 4] {
+    let vsfc = VsfcGains::ma2026(noise()).unwrap();
+    let smith = PiGains::new(1.0, 0.84, 1.0).unwrap();
+    [
+        ("pi", Box::new(Pi::new(PiGains::MA2026, noise(), limits, running))),
+        ("vsfc", Box::new(Vsfc::new(model(), vsfc, noise(), limits, running))),
+        ("smith", Box::new(SmithPi::new(model(), smith, 0.23, noise(), limits, running))),
+        ("ours", Box::new(ours(limits, running))),
+    ]
+}
+
+fn free() -> Limits {
+    Limits::new(Rpm::ZERO, FASTEST, 1e6).unwrap()
+}
+
+fn running(pressure: f64, target: f64, speed: f64) -> Running {
+    let [pressure, target] = [pressure, target].map(MPa::constant);
+    Running { pressure, target, speed: Rpm::constant(speed) }
+}
+
+/// Runs a law on a plant from `from_s` on, with readings at 50 Hz and commands
+/// at 20 Hz, and gives pressure and speed of every tick.
+fn drive(
+    law: &mut dyn PressureLaw,
+    plant: &mut Plant,
+    until_s: f64,
+    target: impl Fn(f64) -> f64,
+) -> Vec<(f64, f64)> {
+    let mut course = Vec::new();
+    let mut tick = 0_u64;
+    while plant.now_s() < until_s {
+        let now = Stamp::from_secs(plant.now_s());
+        if tick.is_multiple_of(4) {
+            law.measured(now, plant.read()).unwrap();
+        }
+        if tick.is_multiple_of(10) {
+            plant.command(law.step(now, MPa::constant(target(plant.now_s()))).speed);
+        }
+        course.push((plant.pressure(), plant.speed_rpm()));
+        plant.advance();
+        tick += 1;
+    }
+    course
+}
+
+#[test]
+fn a_law_that_takes_over_begins_with_the_speed_that_runs() {
+    // At rest, off the model by a load, and far from the target.
+    for running in [running(0.6, 0.6, 0.6), running(0.58, 0.6, 0.65), running(0.2, 0.9, 0.4)] {
+        for (name, mut law) in laws(free(), running) {
+            let now = Stamp::from_secs(7.3);
+            law.measured(now, running.pressure).unwrap();
+            let first = law.step(now, running.target).speed.get();
+            assert!((first - running.speed.get()).abs() < 1e-9, "{name} {running:?}: {first}");
+        }
+    }
+}
+
+#[test]
+fn switching_to_any_law_in_the_middle_of_a_step_is_no_jump() {
+    for which in 0..4 {
+        let start = running(0.0, 0.0, 0.0);
+        let mut plant = Plant::new(model(), Disturbed::default(), FASTEST, start);
+        let mut before = ours(free(), start);
+        drive(&mut before, &mut plant, 1.0, |_| 0.6);
+        let now = running(plant.pressure(), 0.6, plant.speed_rpm());
+        let (name, mut law) = laws(free(), now).into_iter().nth(which).unwrap();
+        let course = drive(law.as_mut(), &mut plant, 30.0, |_| 0.6);
+        let (_, first) = course[0];
+        assert!((first - now.speed.get()).abs() < 1e-9, "{name}: {first} after {now:?}");
+        let (last, _) = course[course.len() - 1];
+        assert!((last - 0.6).abs() < 0.025, "{name}: {last}");
+    }
+}
+
+#[test]
+fn nothing_winds_up_while_the_target_is_out_of_reach() {
+    for which in 0..4 {
+        let start = running(0.6, 0.6, 0.6);
+        let (name, mut law) = laws(free(), start).into_iter().nth(which).unwrap();
+        let mut plant = Plant::new(model(), Disturbed::default(), FASTEST, start);
+        drive(law.as_mut(), &mut plant, 60.0, |_| 5.0);
+        assert!(plant.speed_rpm() > 2.99, "{name}");
+        let course = drive(law.as_mut(), &mut plant, 90.0, |_| 0.6);
+        let slows = course.iter().position(|(_, speed)| *speed < 1.0).unwrap();
+        assert!(slows <= 200, "{name}: only after {slows} ticks");
+        let (last, _) = course[course.len() - 1];
+        assert!((last - 0.6).abs() < 0.025, "{name}: {last}");
+    }
+}
+
+#[test]
+fn commands_keep_the_rate_and_ours_keeps_its_foresight_under_it() {
+    let limits = Limits::new(Rpm::constant(0.1), Rpm::constant(2.0), 1.5).unwrap();
+    let start = running(0.1, 0.1, 0.1);
+    for (name, mut law) in laws(limits, start) {
+        let mut plant = Plant::new(model(), Disturbed::default(), FASTEST, start);
+        let course = drive(law.as_mut(), &mut plant, 10.0, |_| 1.2);
+        for pair in course.windows(2) {
+            let step = (pair[1].1 - pair[0].1).abs();
+            assert!(step <= 1.5 * PERIOD.secs() + 1e-12, "{name}: {step}");
+        }
+        assert!(course.iter().all(|(_, speed)| (0.1..=2.0).contains(speed)), "{name}");
+        if name == "ours" {
+            let highest = course.iter().map(|(pressure, _)| *pressure).fold(0.0, f64::max);
+            assert!(highest < 1.2 * 1.03, "{highest}");
+        }
+    }
+}
+
+#[test]
+fn readings_that_cannot_be_are_refused_and_change_nothing() {
+    for (name, mut law) in laws(free(), running(0.6, 0.6, 0.6)) {
+        let at = Stamp::from_secs;
+        law.measured(at(1.0), MPa::constant(0.6)).unwrap();
+        let late = law.measured(at(0.5), MPa::constant(9.0)).unwrap_err();
+        assert_eq!(late, Refused::Late { late_s: 0.5 }, "{name}");
+        let wild = law.measured(at(1.1), MPa::constant(2e6)).unwrap_err();
+        assert!(wild.to_string().contains("check the sensor"), "{name}: {wild}");
+        let speed = law.step(at(1.2), MPa::constant(0.6)).speed.get();
+        assert!((speed - 0.6).abs() < 1e-9, "{name}: {speed}");
+    }
+    // What is no number cannot even be asked.
+    assert!(MPa::new(f64::NAN).is_err());
+}
+
+#[test]
+fn a_second_call_at_the_same_moment_gives_the_same_command() {
+    for (name, mut law) in laws(free(), running(0.0, 0.0, 0.0)) {
+        let now = Stamp::from_secs(1.0);
+        let once = law.step(now, MPa::constant(0.6));
+        assert_eq!(law.step(now, MPa::constant(0.1)), once, "{name}");
+        assert_eq!(law.step(Stamp::START, MPa::constant(0.1)), once, "{name}");
+    }
+}
+
+#[test]
+fn a_model_that_cannot_be_is_refused_with_what_was_found() {
+    assert!(Fopdt::new(0.0, 0.84, 0.41).is_err());
+    assert!(Fopdt::new(1.0, f64::NAN, 0.41).is_err());
+    let error = Fopdt::new(1.0, 0.84, -0.1).unwrap_err().to_string();
+    assert_eq!(error, "the dead time [s] is -0.1: it must be between 0 and 60");
+    assert!(Tuning::of(&model(), &noise(), 0.5).is_err());
+    assert!(VsfcGains::new(1.0, 1.0, 1.5, MPa::ZERO).is_err());
+    assert!(PiGains::new(1.0, 0.0, 1.0).is_err());
+}
+
+#[test]
+fn a_step_tells_ours_by_how_much_its_model_is_off() {
+    let cases = [(1.2, 0.84, 0.41), (0.8, 0.84, 0.41), (1.0, 0.84, 0.492), (1.0, 0.84, 0.328)];
+    for (gain, lag, dead) in cases {
+        let start = running(0.0, 0.0, 0.0);
+        let process = Fopdt::new(gain, lag, dead).unwrap();
+        let disturbed = Disturbed { noise_mpa2: 4.98e-5, seed: 3, ..Disturbed::default() };
+        let mut plant = Plant::new(process, disturbed, FASTEST, start);
+        let mut law = ours(free(), start);
+        drive(&mut law, &mut plant, 4.0, |_| 0.6);
+        // The plant takes a command over a tick late.
+        let dead_found = law.dead_time_s();
+        assert!((dead_found - dead - 0.005).abs() < 0.025, "{gain} {dead}: {dead_found}");
+        let found = law.foretold(Stamp::from_secs(4.0));
+        // Gain and load share what a single level can tell.
+        let settled = found.gain * plant.speed_rpm() + found.load;
+        assert!((settled - gain * plant.speed_rpm()).abs() < 0.01, "{gain} {dead}: {found:?}");
+        assert!((found.gain - gain).abs() < 0.07, "{gain} {dead}: {found:?}");
+    }
+}
+
+#[test]
+fn a_process_without_dead_time_is_held_as_well() {
+    let process = Fopdt::new(0.02, 2.0, 0.0).unwrap();
+    let noise = Noise::new(1e-6, 1e-4).unwrap();
+    let tuning = Tuning::of(&process, &noise, 0.1).unwrap();
+    let limits = Limits::new(Rpm::ZERO, Rpm::constant(300.0), 1e6).unwrap();
+    let start = running(1.0, 1.0, 50.0);
+    let mut law = Predictive::new(process, tuning, limits, start);
+    let mut plant = Plant::new(process, Disturbed::default(), Rpm::constant(300.0), start);
+    let course = drive(&mut law, &mut plant, 20.0, |_| 2.0);
+    let highest = course.iter().map(|(pressure, _)| *pressure).fold(0.0, f64::max);
+    assert!(highest < 2.01, "{highest}");
+    assert!((plant.pressure() - 2.0).abs() < 1e-3, "{}", plant.pressure());
+}
+
+proptest! {
+    #[test]
+    fn commands_are_finite_and_within_the_limits_whatever_is_read(
+        calls in prop::collection::vec(
+            (0_u64..3_000_000_000, prop_oneof![-10.0..10.0_f64, any::<f64>()],
+             prop_oneof![-10.0..10.0_f64, any::<f64>()], any::<bool>()),
+            1..80,
+        ),
+    ) {
+        let limits = Limits::new(Rpm::constant(-1.0), FASTEST, 5.0).unwrap();
+        for (name, mut law) in laws(limits, running(0.3, 0.4, 0.5)) {
+            let mut now = Stamp::START;
+            for (ns, reading, target, step) in &calls {
+                now = now + Span::from_ns(i64::try_from(*ns).unwrap());
+                if let Ok(reading) = MPa::new(*reading) {
+                    let _ = law.measured(now, reading);
+                }
+                if let (true, Ok(target)) = (*step, MPa::new(*target)) {
+                    let speed = law.step(now, target).speed.get();
+                    prop_assert!((-1.0..=3.0).contains(&speed), "{}: {}", name, speed);
+                }
+                prop_assert!(law.lead().secs().is_finite());
+            }
+        }
+    }
+}

@@ -1,0 +1,424 @@
+//! The experiments of Ma et al. 2026: steps, sines, steady extrusion under
+//! drift and steps of the load, with the paper's laws and with ours, on the
+//! same plant.
+
+use std::f64::consts::TAU;
+
+use super::pressure::{Disturbed, Drift, Load, Plant, TICK_S};
+use crate::extruder::pressure::kalman::Noise;
+use crate::extruder::pressure::pi::{Pi, PiGains};
+use crate::extruder::pressure::predictive::Predictive;
+use crate::extruder::pressure::smith::SmithPi;
+use crate::extruder::pressure::tuning::Tuning;
+use crate::extruder::pressure::vsfc::{Vsfc, VsfcGains};
+use crate::extruder::pressure::{Fopdt, Limits, PressureError, PressureLaw, Running};
+use crate::time::Stamp;
+use crate::units::{MPa, Rpm};
+
+/// Variance of a reading \[MPa²\] (the exponent's sign is misprinted in the
+/// paper).
+pub const NOISE_MPA2: f64 = 4.98e-5;
+/// Variance of the wandering that the paper's filter is set for \[MPa²\].
+pub const WANDER_MPA2: f64 = 2e-5;
+/// Lag of the process \[s\].
+pub const LAG_S: f64 = 0.84;
+/// Dead time of the process \[s\].
+pub const DEAD_TIME_S: f64 = 0.41;
+/// Target of the step and of the steady experiment \[MPa\].
+pub const STEP_MPA: f64 = 0.6;
+/// Step of the load, at the plant's input \[rpm\].
+pub const LOAD_RPM: f64 = 0.1;
+/// Ticks of the plant from reading to reading: 50 Hz.
+const READ_EVERY: u64 = 4;
+/// Ticks from command to command: 20 Hz.
+pub const STEP_EVERY: u64 = 10;
+/// How far the process may be from the model, as a share: two standard
+/// deviations of what our law allows for.
+pub const OFF: f64 = 0.2;
+
+/// A law that is tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tried {
+    /// The paper's comparison, a proportional-integral law.
+    Pi,
+    /// The paper's own.
+    Vsfc,
+    /// Two degrees of freedom with Smith's predictor, nothing adapted.
+    SmithPi,
+    /// This program's.
+    Predictive,
+    /// The same with the target known ahead.
+    Previewed,
+}
+
+/// The process by the factors that gain, lag and dead time are off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Factors {
+    /// Of the gain.
+    pub gain: f64,
+    /// Of the lag.
+    pub lag: f64,
+    /// Of the dead time.
+    pub dead_time: f64,
+}
+
+impl Factors {
+    /// The process as the model has it.
+    pub const NONE: Self = Self { gain: 1.0, lag: 1.0, dead_time: 1.0 };
+
+    /// Each alone by [`OFF`] up and down.
+    pub const fn singles() -> [(&'static str, Self); 6] {
+        let (more, less) = (1.0 + OFF, 1.0 - OFF);
+        [
+            ("gain +20 %", Self { gain: more, ..Self::NONE }),
+            ("gain −20 %", Self { gain: less, ..Self::NONE }),
+            ("lag +20 %", Self { lag: more, ..Self::NONE }),
+            ("lag −20 %", Self { lag: less, ..Self::NONE }),
+            ("dead time +20 %", Self { dead_time: more, ..Self::NONE }),
+            ("dead time −20 %", Self { dead_time: less, ..Self::NONE }),
+        ]
+    }
+
+    /// All 27 combinations of up, not and down.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let each = [1.0 - OFF, 1.0, 1.0 + OFF];
+        each.into_iter().flat_map(move |gain| {
+            each.into_iter().flat_map(move |lag| {
+                each.into_iter().map(move |dead_time| Self { gain, lag, dead_time })
+            })
+        })
+    }
+
+    fn process(self) -> Result<Fopdt, PressureError> {
+        Fopdt::new(self.gain, LAG_S * self.lag, DEAD_TIME_S * self.dead_time)
+    }
+}
+
+/// The model that every law is given.
+pub fn model() -> Result<Fopdt, PressureError> {
+    Factors::NONE.process()
+}
+
+/// What a run came to.
+#[derive(Debug, Clone, Default)]
+pub struct Course {
+    /// Time \[s\], tick by tick.
+    pub time_s: Vec<f64>,
+    /// What was wanted \[MPa\].
+    pub target: Vec<f64>,
+    /// The true pressure \[MPa\].
+    pub pressure: Vec<f64>,
+    /// Speed of the screw \[rpm\].
+    pub speed: Vec<f64>,
+}
+
+/// An experiment.
+#[derive(Debug, Clone)]
+pub struct Experiment {
+    /// The process, by how far it is from the model.
+    pub factors: Factors,
+    /// What disturbs it.
+    pub disturbed: Disturbed,
+    /// What is wanted before it begins \[MPa\].
+    pub before: f64,
+    /// What is wanted from then on.
+    pub target: Target,
+    /// How long it takes \[s\].
+    pub takes_s: f64,
+    /// Ticks of the plant from command to command.
+    pub step_every: u64,
+}
+
+/// What is wanted over time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Target {
+    /// Always the same \[MPa\].
+    Steady(f64),
+    /// A wave about a mean \[MPa\] with a period \[s\].
+    Sine {
+        /// Mean.
+        mean: f64,
+        /// Amplitude.
+        amplitude: f64,
+        /// Period.
+        period_s: f64,
+    },
+}
+
+impl Target {
+    /// At a time \[s\].
+    pub fn at(&self, at_s: f64) -> f64 {
+        match *self {
+            Self::Steady(mpa) => mpa,
+            Self::Sine { mean, amplitude, period_s } => {
+                mean + amplitude * libm::sin(TAU * at_s / period_s)
+            }
+        }
+    }
+}
+
+impl Tried {
+    /// Its name in tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Pi => "PID",
+            Self::Vsfc => "VSFC-Smith",
+            Self::SmithPi => "Smith-PI, two degrees of freedom",
+            Self::Predictive => "predictive",
+            Self::Previewed => "predictive, target previewed",
+        }
+    }
+
+    /// The law, taking over from what runs.
+    pub fn law(self, running: Running) -> Result<Box<dyn PressureLaw>, PressureError> {
+        let model = model()?;
+        let noise = Noise::new(WANDER_MPA2, NOISE_MPA2)?;
+        let limits = Limits::new(Rpm::ZERO, Rpm::constant(3.0), 1e6)?;
+        Ok(match self {
+            Self::Pi => Box::new(Pi::new(PiGains::MA2026, noise, limits, running)),
+            Self::Vsfc => {
+                let gains = VsfcGains::ma2026(noise)?;
+                Box::new(Vsfc::new(model, gains, noise, limits, running))
+            }
+            Self::SmithPi => {
+                let gains = PiGains::new(1.0, LAG_S, 1.0)?;
+                Box::new(SmithPi::new(model, gains, 0.23, noise, limits, running))
+            }
+            Self::Predictive | Self::Previewed => {
+                let tuning = Tuning::of(&model, &noise, OFF / 2.0)?;
+                Box::new(Predictive::new(model, tuning, limits, running))
+            }
+        })
+    }
+}
+
+impl Experiment {
+    /// From rest to [`STEP_MPA`].
+    pub fn step(factors: Factors) -> Self {
+        Self {
+            factors,
+            disturbed: Disturbed::default(),
+            before: 0.0,
+            target: Target::Steady(STEP_MPA),
+            takes_s: 10.0,
+            step_every: STEP_EVERY,
+        }
+    }
+
+    /// A sine of 0.1 MPa about 0.65 MPa, 20 s long, five times, with noise.
+    pub fn sine(seed: u64) -> Self {
+        let target = Target::Sine { mean: 0.65, amplitude: 0.1, period_s: 20.0 };
+        let disturbed = Disturbed { noise_mpa2: NOISE_MPA2, seed, ..Disturbed::default() };
+        Self {
+            factors: Factors::NONE,
+            disturbed,
+            before: 0.65,
+            target,
+            takes_s: 100.0,
+            step_every: STEP_EVERY,
+        }
+    }
+
+    /// Two minutes at [`STEP_MPA`] with a gain that drifts, and noise.
+    pub fn steady(seed: u64) -> Self {
+        let drift =
+            vec![Drift { share: 0.03, period_s: 60.0 }, Drift { share: 0.015, period_s: 17.0 }];
+        let disturbed = Disturbed { drift, load: None, noise_mpa2: NOISE_MPA2, seed };
+        let target = Target::Steady(STEP_MPA);
+        Self {
+            factors: Factors::NONE,
+            disturbed,
+            before: STEP_MPA,
+            target,
+            takes_s: 120.0,
+            step_every: STEP_EVERY,
+        }
+    }
+
+    /// A step of the load after 5 s at [`STEP_MPA`].
+    pub fn load(factors: Factors) -> Self {
+        let load = Some(Load { at_s: 5.0, rpm: LOAD_RPM });
+        let disturbed = Disturbed { load, ..Disturbed::default() };
+        let target = Target::Steady(STEP_MPA);
+        Self { factors, disturbed, before: STEP_MPA, target, takes_s: 25.0, step_every: STEP_EVERY }
+    }
+
+    /// The same with the sensor's noise.
+    pub fn noisy(mut self, seed: u64) -> Self {
+        self.disturbed.noise_mpa2 = NOISE_MPA2;
+        self.disturbed.seed = seed;
+        self
+    }
+
+    /// Runs it with a law.
+    pub fn run(&self, tried: Tried) -> Result<Course, PressureError> {
+        let before = MPa::new(self.before).unwrap_or_default();
+        let speed = Rpm::new(self.before / self.factors.gain).unwrap_or_default();
+        let running = Running { pressure: before, target: before, speed };
+        let mut law = tried.law(running)?;
+        let process = self.factors.process()?;
+        let fastest = Rpm::constant(3.0);
+        let mut plant = Plant::new(process, self.disturbed.clone(), fastest, running);
+        let mut course = Course::default();
+        let mut tick = 0;
+        while plant.now_s() <= self.takes_s {
+            let now_s = plant.now_s();
+            course.target.push(self.target.at(now_s));
+            course.time_s.push(now_s);
+            course.pressure.push(plant.pressure());
+            self.act(tick, law.as_mut(), &mut plant, tried == Tried::Previewed);
+            course.speed.push(plant.speed_rpm());
+            plant.advance();
+            tick += 1;
+        }
+        Ok(course)
+    }
+
+    fn act(&self, tick: u64, law: &mut dyn PressureLaw, plant: &mut Plant, previewed: bool) {
+        let now = Stamp::from_secs(plant.now_s());
+        if tick.is_multiple_of(READ_EVERY) {
+            // Simulated readings are never late and always plausible.
+            let _ = law.measured(now, plant.read());
+        }
+        if tick.is_multiple_of(self.step_every.max(1)) {
+            let ahead = if previewed { law.lead().secs() } else { 0.0 };
+            let target = MPa::new(self.target.at(plant.now_s() + ahead)).unwrap_or_default();
+            plant.command(law.step(now, target).speed);
+        }
+    }
+}
+
+/// What a step response came to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepFigures {
+    /// Highest pressure beyond the target \[% of it\].
+    pub overshoot: f64,
+    /// From the command to 90 % of the target \[s\]; none where it never gets
+    /// there.
+    pub rise_s: Option<f64>,
+    /// Integral of the error's size \[MPa·s\].
+    pub iae: f64,
+}
+
+/// What a step of the load came to, for each MPa that it would come to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoadFigures {
+    /// Largest error.
+    pub peak: f64,
+    /// Integral of the error's size \[s\].
+    pub iae: f64,
+}
+
+impl Course {
+    /// The figures of a step from rest to its last target.
+    pub fn step_figures(&self) -> StepFigures {
+        let target = self.target.last().copied().unwrap_or_default();
+        let highest = self.pressure.iter().copied().fold(0.0, f64::max);
+        let iae = self.errors().map(|error| error.abs() * TICK_S).sum();
+        StepFigures {
+            overshoot: (highest / target - 1.0) * 100.0,
+            rise_s: self.passes(0.9 * target),
+            iae,
+        }
+    }
+
+    /// When the pressure first passes a value on its way up \[s\].
+    fn passes(&self, value: f64) -> Option<f64> {
+        let after = self.pressure.iter().position(|pressure| *pressure >= value)?;
+        let [low, high] = [self.pressure.get(after.checked_sub(1)?)?, self.pressure.get(after)?];
+        let before_s = self.time_s.get(after - 1)?;
+        Some(before_s + TICK_S * (value - low) / (high - low))
+    }
+
+    /// The figures of a step of the load that came after `at_s`.
+    pub fn load_figures(&self, at_s: f64) -> LoadFigures {
+        let since = self.errors().zip(&self.time_s).filter(|(_, t)| **t >= at_s);
+        let (mut peak, mut iae) = (0.0_f64, 0.0);
+        for (error, _) in since {
+            peak = peak.max(error.abs() / LOAD_RPM);
+            iae += error.abs() / LOAD_RPM * TICK_S;
+        }
+        LoadFigures { peak, iae }
+    }
+
+    /// Root mean square and largest size of the error after `from_s` \[MPa\].
+    pub fn tracking(&self, from_s: f64) -> (f64, f64) {
+        let errors = self.after(from_s, self.errors());
+        (mean(errors.iter().map(|e| e * e)).sqrt(), errors.iter().fold(0.0, |m, e| m.max(e.abs())))
+    }
+
+    /// Standard deviation of the pressure \[MPa\] and variation of the speed
+    /// \[%\] after `from_s`.
+    pub fn steadiness(&self, from_s: f64) -> (f64, f64) {
+        let (_, sigma) = spread(&self.after(from_s, self.pressure.iter().copied()));
+        let (mean, deviation) = spread(&self.after(from_s, self.speed.iter().copied()));
+        (sigma, 100.0 * deviation / mean)
+    }
+
+    fn errors(&self) -> impl Iterator<Item = f64> {
+        self.pressure.iter().zip(&self.target).map(|(pressure, target)| pressure - target)
+    }
+
+    fn after(&self, from_s: f64, values: impl Iterator<Item = f64>) -> Vec<f64> {
+        values.zip(&self.time_s).filter(|(_, t)| **t >= from_s).map(|(value, _)| value).collect()
+    }
+}
+
+/// How far a process may be from the model until a law no longer comes to rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Margins {
+    /// Gain over that of the model.
+    pub gain: f64,
+    /// Dead time beyond that of the model \[s\].
+    pub dead_time_s: f64,
+}
+
+/// The margins of a law, tried out: 40 s after a step of the load the pressure
+/// still swings by more than 5 kPa.
+pub fn margins(tried: Tried) -> Result<Margins, PressureError> {
+    let gain = largest(1.0, 12.0, |gain| rests(tried, Factors { gain, ..Factors::NONE }))?;
+    let dead_time =
+        largest(1.0, 12.0, |dead_time| rests(tried, Factors { dead_time, ..Factors::NONE }))?;
+    Ok(Margins { gain, dead_time_s: (dead_time - 1.0) * DEAD_TIME_S })
+}
+
+fn rests(tried: Tried, factors: Factors) -> Result<bool, PressureError> {
+    let mut experiment = Experiment::load(factors);
+    let rpm = LOAD_RPM / factors.gain;
+    experiment.disturbed.load = Some(Load { at_s: 5.0, rpm });
+    experiment.takes_s = 60.0;
+    let (sigma, _) = experiment.run(tried)?.steadiness(45.0);
+    Ok(sigma < 0.005)
+}
+
+/// Where a property that holds at `low` ends, to a percent.
+fn largest(
+    low: f64,
+    high: f64,
+    mut holds: impl FnMut(f64) -> Result<bool, PressureError>,
+) -> Result<f64, PressureError> {
+    let (mut low, mut high) = (low, high);
+    while high / low > 1.01 {
+        let middle = (low * high).sqrt();
+        if holds(middle)? {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    Ok(low)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a count of ticks")]
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
+    sum / count.max(1) as f64
+}
+
+fn spread(values: &[f64]) -> (f64, f64) {
+    let middle = mean(values.iter().copied());
+    (middle, mean(values.iter().map(|value| (value - middle).powi(2))).sqrt())
+}
+
+#[cfg(test)]
+mod tests;

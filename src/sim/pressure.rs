@@ -1,0 +1,205 @@
+//! A simulated extruder from the screw's speed to the pressure at the nozzle:
+//! lag and dead time, a gain that drifts, a load at its input, a screw that
+//! turns no slower and no faster than it can, and a sensor with noise.
+
+use std::collections::VecDeque;
+use std::f64::consts::TAU;
+
+use super::hash::{mix, normal_pair};
+use crate::extruder::pressure::{Fopdt, Running};
+use crate::units::{MPa, Rpm};
+
+/// Step of the plant \[s\].
+pub const TICK_S: f64 = 0.005;
+
+/// A wave of the gain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drift {
+    /// Amplitude, as a share of the gain.
+    pub share: f64,
+    /// Period \[s\].
+    pub period_s: f64,
+}
+
+/// A step of the load.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Load {
+    /// When it comes \[s\].
+    pub at_s: f64,
+    /// How large it is, at the input of the lag \[rpm\].
+    pub rpm: f64,
+}
+
+/// What disturbs the process.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Disturbed {
+    /// Waves of the gain.
+    pub drift: Vec<Drift>,
+    /// A step of the load.
+    pub load: Option<Load>,
+    /// Variance of a reading \[MPa²\].
+    pub noise_mpa2: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+/// The plant with its state.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    process: Fopdt,
+    disturbed: Disturbed,
+    fastest_rpm: f64,
+    /// Speeds of the ticks that are under way, the newest first.
+    under_way: VecDeque<f64>,
+    /// Whole ticks of the dead time, and the rest of it as a share of a tick.
+    ticks: usize,
+    rest: f64,
+    speed_rpm: f64,
+    pressure: f64,
+    tick: u64,
+}
+
+impl Plant {
+    /// As it has run for ever.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "at most 60 s of ticks"
+    )]
+    pub fn new(process: Fopdt, disturbed: Disturbed, fastest: Rpm, running: Running) -> Self {
+        let ticks = process.dead_time_s() / TICK_S;
+        // A dead time of whole ticks must not lose one to rounding.
+        let whole = (ticks + 1e-9).floor();
+        let speed_rpm = running.speed.get();
+        let mut under_way = VecDeque::with_capacity(whole as usize + 2);
+        under_way.resize(whole as usize + 2, speed_rpm);
+        Self {
+            process,
+            disturbed,
+            fastest_rpm: fastest.get(),
+            under_way,
+            ticks: whole as usize,
+            rest: (ticks - whole).max(0.0),
+            speed_rpm,
+            pressure: running.pressure.get(),
+            tick: 0,
+        }
+    }
+
+    /// The time \[s\].
+    #[expect(clippy::cast_precision_loss, reason = "ticks of some minutes")]
+    pub fn now_s(&self) -> f64 {
+        self.tick as f64 * TICK_S
+    }
+
+    /// The true pressure \[MPa\].
+    pub const fn pressure(&self) -> f64 {
+        self.pressure
+    }
+
+    /// The speed that the screw turns at \[rpm\].
+    pub const fn speed_rpm(&self) -> f64 {
+        self.speed_rpm
+    }
+
+    /// What the sensor reads.
+    pub fn read(&self) -> MPa {
+        let [normal, _] = normal_pair(mix(&[0x7072_6573, self.disturbed.seed, self.tick]));
+        let noise = self.disturbed.noise_mpa2.sqrt() * normal;
+        MPa::new(self.pressure + noise).unwrap_or_default()
+    }
+
+    /// A command to the screw. It takes it over with the next tick.
+    pub fn command(&mut self, speed: Rpm) {
+        self.speed_rpm = speed.get().clamp(0.0, self.fastest_rpm);
+    }
+
+    /// Lets a tick pass. The speed that is commanded now begins to work a dead
+    /// time after the end of this tick.
+    pub fn advance(&mut self) {
+        let at_s = self.now_s();
+        let drift: f64 = self.disturbed.drift.iter().map(|wave| wave.at(at_s)).sum();
+        let load = self.disturbed.load.filter(|load| at_s >= load.at_s - 1e-9);
+        let load = load.map_or(0.0, |load| load.rpm);
+        let old = |back: usize| self.under_way.get(back).copied().unwrap_or(self.speed_rpm);
+        // The rest of the dead time belongs to the speed of one tick earlier.
+        for (speed, share) in [(old(self.ticks + 1), self.rest), (old(self.ticks), 1.0 - self.rest)]
+        {
+            let settled = self.process.gain() * (1.0 + drift) * (speed + load);
+            let kept = libm::exp(-share * TICK_S / self.process.lag_s());
+            self.pressure = settled + (self.pressure - settled) * kept;
+        }
+        self.under_way.pop_back();
+        self.under_way.push_front(self.speed_rpm);
+        self.tick += 1;
+    }
+}
+
+impl Drift {
+    fn at(&self, at_s: f64) -> f64 {
+        self.share * libm::sin(TAU * at_s / self.period_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn still() -> Running {
+        Running { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO }
+    }
+
+    #[test]
+    fn a_step_arrives_after_a_dead_time_that_is_no_multiple_of_a_tick() {
+        for dead in [0.41, 0.4137, 0.0, 0.492] {
+            let process = Fopdt::new(2.0, 0.84, dead).unwrap();
+            let fastest = Rpm::constant(3.0);
+            let mut plant = Plant::new(process, Disturbed::default(), fastest, still());
+            plant.command(Rpm::constant(0.3));
+            for _ in 0..400 {
+                plant.advance();
+                let since = (plant.now_s() - TICK_S - dead).max(0.0);
+                let expected = 0.6 * (1.0 - f64::exp(-since / 0.84));
+                assert!((plant.pressure() - expected).abs() < 1e-12, "{dead} {since}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_screw_keeps_what_it_can_turn() {
+        let process = Fopdt::new(1.0, 0.1, 0.0).unwrap();
+        let fastest = Rpm::constant(3.0);
+        let mut plant = Plant::new(process, Disturbed::default(), fastest, still());
+        plant.command(Rpm::constant(50.0));
+        for _ in 0..2000 {
+            plant.advance();
+        }
+        assert!((plant.pressure() - 3.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_load_and_a_drift_do_what_they_say() {
+        let process = Fopdt::new(1.0, 0.05, 0.41).unwrap();
+        let disturbed = Disturbed {
+            drift: vec![Drift { share: 0.1, period_s: 1e4 }],
+            load: Some(Load { at_s: 1.0, rpm: 0.1 }),
+            ..Disturbed::default()
+        };
+        let running =
+            Running { pressure: MPa::constant(0.6), target: MPa::ZERO, speed: Rpm::constant(0.6) };
+        let mut plant = Plant::new(process, disturbed, Rpm::constant(3.0), running);
+        for _ in 0..200 {
+            plant.advance();
+        }
+        assert!((plant.pressure() - 0.6).abs() < 1e-3);
+        for _ in 0..200 {
+            plant.advance();
+        }
+        assert!((plant.pressure() - 0.7).abs() < 1e-3);
+        for _ in 0..499_600 {
+            plant.advance();
+        }
+        // A quarter of the drift's period.
+        assert!((plant.pressure() - 0.77).abs() < 1e-3, "{}", plant.pressure());
+    }
+}
