@@ -9,13 +9,18 @@ use super::WrongArguments;
 use crate::calib::{Calibration, SurfaceMap};
 use crate::config::Cell;
 use crate::config::cell::{CalibrationSource, ExtruderPart, Purpose};
-use crate::config::extruder::Strategy;
+use crate::config::extruder::{FeedforwardKeys, ModelSource, Strategy};
 use crate::extruder::Law;
-use crate::extruder::law::{AdaptiveNozzle, Constant, Played, ScrewFill};
+use crate::extruder::feedforward::{Inverse, InverseSettings};
+use crate::extruder::law::{
+    AdaptiveNozzle, Constant, Foreseen, OperatingPoint, Played, PressureLoop, ScrewFill,
+};
 use crate::identify::profile;
-use crate::io::calibration_file;
+use crate::identify::quantity::Unit;
+use crate::io::{calibration_file, model_file};
 use crate::sim::cell::Rig;
 use crate::sim::extruder::SimExtruder;
+use crate::time::Span;
 use crate::units::Mm;
 
 /// A cell, its calibration, and their texts for the recording.
@@ -77,6 +82,8 @@ impl LoadedCell {
         let law = match &part.extruder.strategy {
             Strategy::Constant { value } => Law::Constant(Constant(*value)),
             Strategy::Profile { file } => Law::Profile(read_profile(file, part)?),
+            Strategy::Feedforward(keys) => Law::Feedforward(self.foreseen(keys, part)?),
+            Strategy::Pressure(settings) => Law::Pressure(PressureLoop::new(**settings)),
             Strategy::Screw(settings) => Law::Screw(ScrewFill::new(settings)?),
             Strategy::Adaptive(parts) => Law::Adaptive(AdaptiveNozzle::new(parts.0, parts.1)),
         };
@@ -87,6 +94,43 @@ impl LoadedCell {
             plant: SimExtruder::of(plant, seed)?,
             nominal_flow: part.plant_nominal,
         }))
+    }
+
+    /// The inverse of the model that the cell names.
+    fn foreseen(&self, keys: &FeedforwardKeys, part: &ExtruderPart) -> anyhow::Result<Foreseen> {
+        let wrong = |what: String| {
+            WrongArguments::new(format!("{}: [extruder]: {what}", self.path.display()))
+        };
+        let model = match &keys.model {
+            ModelSource::File(file) => model_file::read(file)?,
+            ModelSource::Library { folder, wanted } => {
+                let library = model_file::read_library(folder)?;
+                let found = library.find(wanted).map_err(|error| wrong(error.to_string()))?;
+                tracing::info!(model = found.entry.name, off_c = found.off_c, "model of the cell");
+                found.entry.model.clone()
+            }
+        };
+        let extruder = &part.extruder;
+        let (unit, flow) = (extruder.drive.unit(), Unit::Mm3PerS);
+        if model.input.unit != unit || model.output.unit != flow {
+            return Err(wrong(format!(
+                "found a model from {} to {}, expected one from {unit} to {flow}",
+                model.input, model.output
+            ))
+            .into());
+        }
+        let (command, flow_mm3_per_s) = model.operating_point;
+        let settings = InverseSettings {
+            time_constant_s: keys.time_constant_s,
+            right_zeros: keys.right_zeros,
+            known_ahead: Span::ZERO,
+            late: keys.late,
+            limits: extruder.limits.about(command),
+            period: Span::from_secs(1.0 / extruder.rates.feedforward_hz),
+        };
+        let inverse =
+            Inverse::new(&model.transfer, &settings).map_err(|error| wrong(error.to_string()))?;
+        Ok(Foreseen::new(inverse, OperatingPoint { command, flow_mm3_per_s }))
     }
 
     /// The map of the measured surface, for a camera that rides as the cell

@@ -4,13 +4,14 @@
 
 mod adaptive;
 mod plant;
+mod pressure;
 mod screw;
 mod strategy;
 
 use std::path::Path;
 
-pub use plant::{ExtruderPlant, LinearPlant, PlantKind, ScrewPlant};
-pub use strategy::Strategy;
+pub use plant::{ExtruderPlant, LinearPlant, PlantKind, PressurePlant, ScrewPlant};
+pub use strategy::{FeedforwardKeys, ModelSource, Strategy};
 
 use super::table::Table;
 use crate::extruder::demand::section;

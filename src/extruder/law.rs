@@ -4,11 +4,13 @@
 mod adaptive;
 mod feedforward;
 mod played;
+mod pressure;
 mod screw;
 
 pub use adaptive::{AdaptiveNozzle, NozzleModel};
 pub use feedforward::{Foreseen, OperatingPoint};
 pub use played::{Constant, Played};
+pub use pressure::{PressureChoice, PressureLoop, PressureSettings};
 pub use screw::ScrewFill;
 
 use super::report::ExtruderReport;
@@ -69,6 +71,11 @@ pub trait Strategy {
     /// Begins a bead at a wanted flow, in the steady state that belongs to it.
     fn begin(&mut self, now: Stamp, flow: Mm3PerS) -> Wish;
 
+    /// Hears a report as it comes. Fails where it cannot be true.
+    fn hear(&mut self, _now: Stamp, _report: &ExtruderReport) -> Result<(), Unusable> {
+        Ok(())
+    }
+
     /// The part that runs at the rate of the feedforward, `dt` after the last
     /// time.
     fn foresee(&mut self, dt: Span, flow: Mm3PerS);
@@ -96,6 +103,8 @@ pub enum Law {
     Profile(Played),
     /// The inverse of a model.
     Feedforward(Foreseen),
+    /// The pressure at the nozzle.
+    Pressure(PressureLoop),
     /// The filled length of a screw, foretold over its delay.
     Screw(ScrewFill),
     /// Model-reference adaptive control of the speed in the nozzle.
@@ -109,6 +118,7 @@ impl Law {
             Self::Constant(law) => law,
             Self::Profile(law) => law,
             Self::Feedforward(law) => law,
+            Self::Pressure(law) => law,
             Self::Screw(law) => law,
             Self::Adaptive(law) => law,
         }
@@ -120,6 +130,7 @@ impl Law {
             Self::Constant(law) => law,
             Self::Profile(law) => law,
             Self::Feedforward(law) => law,
+            Self::Pressure(law) => law,
             Self::Screw(law) => law,
             Self::Adaptive(law) => law,
         }

@@ -66,6 +66,16 @@ impl CommandLimits {
         (self.min, self.max)
     }
 
+    /// Fastest change a second.
+    pub const fn rate_per_s(&self) -> f64 {
+        self.rate_per_s
+    }
+
+    /// The same limits for differences from a command.
+    pub fn about(&self, command: f64) -> Self {
+        Self { min: self.min - command, max: self.max - command, ..*self }
+    }
+
     /// The command while nothing is extruded: nothing, or what comes nearest.
     pub const fn idle(&self) -> f64 {
         0.0_f64.clamp(self.min, self.max)

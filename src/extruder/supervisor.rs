@@ -11,7 +11,7 @@
 //! - fault: the pump is stopped; left when the robot is idle again.
 
 use super::Drive;
-use super::law::{Law, Wish};
+use super::law::{Law, Unusable, Wish};
 use super::limits::{CommandLimit, CommandLimits};
 use super::rates::Rate;
 use super::report::{ExtruderCommand, ExtruderReport, PumpMode};
@@ -277,6 +277,16 @@ impl Supervisor {
         self.resume_from(ExtruderHold::LinkDown);
         if self.has_what_is_needed(report) {
             self.resume_from(ExtruderHold::NoReading);
+            self.hear(now, report);
+        }
+    }
+
+    /// Lets the law hear a report; one that cannot be true is a hold until one
+    /// comes that can.
+    fn hear(&mut self, now: Stamp, report: &ExtruderReport) {
+        match self.setup.law.strategy_mut().hear(now, report) {
+            Ok(()) => {}
+            Err(Unusable) => self.hold(now, ExtruderHold::BadReading),
         }
     }
 

@@ -10,9 +10,11 @@ use crate::units::Mm3PerS;
 
 mod filled;
 mod linear;
+mod pressed;
 
 pub use filled::Filled;
 pub use linear::Linear;
+pub use pressed::Pressed;
 
 /// Step of a simulated plant.
 pub const STEP: Span = Span::from_millis(1);
@@ -92,6 +94,7 @@ impl SimExtruder {
             Delays { start: plant.start_delay, stop: plant.stop_delay, valve: plant.valve_delay };
         let kind: Box<dyn Plant> = match &plant.kind {
             PlantKind::Linear(linear) => Box::new(Linear::new(linear, seed)?),
+            PlantKind::Pressure(pressure) => Box::new(Pressed::new(pressure, seed)),
             PlantKind::Screw(screw) => Box::new(Filled::new(screw, seed)),
         };
         Ok(Self::new(kind, delays))

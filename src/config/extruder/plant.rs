@@ -1,11 +1,15 @@
 //! `[extruder_plant]`: what answers the extruder's commands in a simulated
 //! cell. Nothing here moves a real machine, so most keys have defaults.
 
+use super::pressure::{read_nozzle, read_process};
 use super::screw::read_screw;
 use crate::config::table::Table;
+use crate::extruder::pressure::Fopdt;
+use crate::extruder::rheology::PowerLaw;
 use crate::extruder::screw::{Screw, ScrewDesign};
 use crate::model::TransferFunction;
 use crate::time::Span;
+use crate::units::Rpm;
 
 const ANY: std::ops::RangeInclusive<f64> = -1e12..=1e12;
 /// Coefficients that a numerator or a denominator may have.
@@ -29,8 +33,27 @@ pub struct ExtruderPlant {
 pub enum PlantKind {
     /// A transfer function, or a number, with what no model tells.
     Linear(LinearPlant),
+    /// Lag and dead time to a pressure, and a power law from it to flow.
+    Pressure(PressurePlant),
     /// A screw that is filled through its feed.
     Screw(ScrewPlant),
+}
+
+/// A pressure at the nozzle in a simulated cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PressurePlant {
+    /// From the screw's speed to the pressure.
+    pub process: Fopdt,
+    /// From the pressure to flow.
+    pub nozzle: PowerLaw,
+    /// Fastest that the screw turns.
+    pub fastest: Rpm,
+    /// Noise of the sensor \[MPa\].
+    pub sensor_noise_mpa: f64,
+    /// A wave of the gain, as a share of it, and its period \[s\].
+    pub gain_wave: (f64, f64),
+    /// A load at the input of the process \[rpm\], and when it comes \[s\].
+    pub load: (f64, f64),
 }
 
 /// A linear plant from command to flow.
@@ -70,11 +93,16 @@ pub struct ScrewPlant {
 enum Word {
     Direct,
     Linear,
+    Pressure,
     Screw,
 }
 
-const WORDS: [(&str, Word); 3] =
-    [("direct", Word::Direct), ("linear", Word::Linear), ("screw", Word::Screw)];
+const WORDS: [(&str, Word); 4] = [
+    ("direct", Word::Direct),
+    ("linear", Word::Linear),
+    ("pressure", Word::Pressure),
+    ("screw", Word::Screw),
+];
 
 impl ExtruderPlant {
     /// Reads `[extruder_plant]`.
@@ -90,6 +118,7 @@ impl ExtruderPlant {
                 let transfer = read_transfer(table)?;
                 read_linear(table, transfer).map(PlantKind::Linear)
             }
+            Word::Pressure => read_pressure_plant(table).map(PlantKind::Pressure),
             Word::Screw => read_screw_plant(table).map(PlantKind::Screw),
         });
         if kind.is_none() {
@@ -134,6 +163,25 @@ fn read_linear(table: &Table<'_>, transfer: TransferFunction) -> Option<LinearPl
         flow_noise: noise?,
         flow_noise_lag_s: lag?,
         sensor_noise: sensor,
+    })
+}
+
+fn read_pressure_plant(table: &Table<'_>) -> Option<PressurePlant> {
+    let process = read_process(table);
+    let nozzle = read_nozzle(table);
+    let fastest = table.number("fastest_rpm", 1e-6..=1e6);
+    let noise = table.number_or("sensor_noise_mpa", 0.0..=1e3, 0.0);
+    let wave = table.number_or("gain_wave_share", 0.0..=0.9, 0.0);
+    let period = table.number_or("gain_wave_period_s", 0.1..=1e6, 60.0);
+    let load = table.number_or("load_rpm", -1e6..=1e6, 0.0);
+    let load_at = table.number_or("load_at_s", 0.0..=1e6, 0.0);
+    Some(PressurePlant {
+        process: process?,
+        nozzle: nozzle?,
+        fastest: Rpm::new(fastest?).ok()?,
+        sensor_noise_mpa: noise?,
+        gain_wave: (wave?, period?),
+        load: (load?, load_at?),
     })
 }
 

@@ -2,12 +2,16 @@
 
 use std::path::PathBuf;
 
-use super::{About, adaptive, keys, screw};
+use super::{About, adaptive, keys, pressure, screw};
 use crate::config::table::Table;
 use crate::extruder::Drive;
 use crate::extruder::adaptive::Law as AdaptiveLaw;
-use crate::extruder::law::NozzleModel;
+use crate::extruder::feedforward::RightZeros;
+use crate::extruder::law::{NozzleModel, PressureSettings};
 use crate::extruder::screw::control::ScrewSettings;
+use crate::identify::library::{TOLERANCE_C, Wanted};
+use crate::identify::quantity::Unit;
+use crate::time::Span;
 
 /// How commands are found.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,23 +26,58 @@ pub enum Strategy {
         /// CSV with `time_s` and the command's column.
         file: PathBuf,
     },
+    /// The inverse of a model.
+    Feedforward(FeedforwardKeys),
+    /// The pressure loop.
+    Pressure(Box<PressureSettings>),
     /// The predictor of a screw.
     Screw(Box<ScrewSettings>),
     /// The adaptive law of the nozzle.
     Adaptive(Box<(AdaptiveLaw, NozzleModel)>),
 }
 
+/// How a model is found and inverted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FeedforwardKeys {
+    /// Which model.
+    pub model: ModelSource,
+    /// Time constant of the poles that are placed \[s\].
+    pub time_constant_s: f64,
+    /// How late the flow may be beyond what is known ahead.
+    pub late: Span,
+    /// What becomes of zeros in the right half plane.
+    pub right_zeros: RightZeros,
+}
+
+/// Where a model comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ModelSource {
+    /// A file.
+    File(PathBuf),
+    /// The one of a folder that fits.
+    Library {
+        /// The folder.
+        folder: PathBuf,
+        /// What is looked for.
+        wanted: Wanted,
+    },
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Word {
     Constant,
     Profile,
+    Feedforward,
+    Pressure,
     Screw,
     Adaptive,
 }
 
-const WORDS: [(&str, Word); 4] = [
+const WORDS: [(&str, Word); 6] = [
     ("constant", Word::Constant),
     ("profile", Word::Profile),
+    ("feedforward", Word::Feedforward),
+    ("pressure", Word::Pressure),
     ("screw-predictor", Word::Screw),
     ("adaptive", Word::Adaptive),
 ];
@@ -58,6 +97,12 @@ impl Strategy {
             }
             Word::Profile => {
                 table.text("profile").map(|file| Self::Profile { file: about.folder.join(file) })
+            }
+            Word::Feedforward => read_feedforward(table, about).map(Self::Feedforward),
+            Word::Pressure => {
+                needs(table, about, Drive::Rpm, "rpm");
+                pressure::read(&table.required_table("pressure")?, about)
+                    .map(|settings| Self::Pressure(Box::new(settings)))
             }
             Word::Screw => {
                 needs(table, about, Drive::Filling, "filling");
@@ -79,5 +124,45 @@ fn needs(table: &Table<'_>, about: &About<'_>, drive: Drive, word: &str) {
         let found = Drive::WORDS.iter().find(|known| known.1 == about.drive).map_or("", |k| k.0);
         let expected = format!("\"{word}\", which this strategy gives");
         table.report("command", format!("\"{found}\""), expected);
+    }
+}
+
+fn read_feedforward(table: &Table<'_>, about: &About<'_>) -> Option<FeedforwardKeys> {
+    let model = read_model(table, about);
+    let time_constant = table.number("time_constant_s", 1e-3..=60.0);
+    let late = table.number_or("late_s", 0.0..=60.0, 0.0);
+    let right_zeros = table
+        .choice("right_zeros", &[("refuse", RightZeros::Refuse), ("mirror", RightZeros::Mirror)]);
+    Some(FeedforwardKeys {
+        model: model?,
+        time_constant_s: time_constant?,
+        late: Span::from_secs(late?),
+        right_zeros: right_zeros?,
+    })
+}
+
+fn read_model(table: &Table<'_>, about: &About<'_>) -> Option<ModelSource> {
+    match (table.has("model"), table.has("library")) {
+        (true, true) => {
+            table.report("library", "a library beside a model", "one of model and library");
+            None
+        }
+        (false, true) => {
+            let folder = about.folder.join(table.text("library")?);
+            let material = table.text("material");
+            let nozzle = table.number("nozzle_mm", 0.01..=1e3);
+            let temperature = table.number("temperature_c", -100.0..=2000.0);
+            let tolerance = table.number_or("temperature_tolerance_c", 0.0..=1e3, TOLERANCE_C);
+            let wanted = Wanted {
+                material: material?.to_owned(),
+                nozzle_mm: nozzle?,
+                temperature_c: temperature?,
+                tolerance_c: tolerance?,
+                input: Some(about.drive.unit()),
+                output: Some(Unit::Mm3PerS),
+            };
+            Some(ModelSource::Library { folder, wanted })
+        }
+        (_, false) => table.text("model").map(|file| ModelSource::File(about.folder.join(file))),
     }
 }

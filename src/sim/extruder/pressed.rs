@@ -1,0 +1,57 @@
+//! A pressure at the nozzle that follows the screw, and the flow that it
+//! presses out: the plant of Ma et al. 2026 as an extruder.
+
+use super::{Plant, STEP};
+use crate::config::extruder::PressurePlant;
+use crate::extruder::ExtruderReport;
+use crate::extruder::pressure::Running;
+use crate::extruder::rheology::PowerLaw;
+use crate::sim::pressure::{Disturbed, Drift, Load, Plant as Process, TICK_S};
+use crate::units::{MPa, Mm3PerS, Rpm};
+
+/// The plant with its nozzle.
+#[derive(Debug)]
+pub struct Pressed {
+    process: Process,
+    nozzle: PowerLaw,
+    /// Time since the process was advanced last \[s\].
+    waits_s: f64,
+}
+
+impl Pressed {
+    /// At rest.
+    pub fn new(plant: &PressurePlant, seed: u64) -> Self {
+        let (share, period_s) = plant.gain_wave;
+        let (rpm, at_s) = plant.load;
+        let disturbed = Disturbed {
+            drift: vec![Drift { share, period_s }],
+            load: Some(Load { at_s, rpm }),
+            noise_mpa2: plant.sensor_noise_mpa.powi(2),
+            seed,
+        };
+        let rest = Running { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO };
+        let process = Process::new(plant.process, disturbed, plant.fastest, rest);
+        Self { process, nozzle: plant.nozzle, waits_s: 0.0 }
+    }
+}
+
+impl Plant for Pressed {
+    fn advance(&mut self, command: Option<f64>) {
+        self.process.command(Rpm::new(command.unwrap_or(0.0)).unwrap_or_default());
+        self.waits_s += STEP.secs();
+        if self.waits_s >= TICK_S - 1e-9 {
+            self.waits_s = 0.0;
+            self.process.advance();
+        }
+    }
+
+    fn flow(&self) -> Mm3PerS {
+        let pressure = MPa::new(self.process.pressure().max(0.0)).unwrap_or_default();
+        self.nozzle.flow(pressure).unwrap_or_default()
+    }
+
+    fn sense(&mut self, report: &mut ExtruderReport) {
+        report.pressure_mpa = Some(self.process.read());
+        report.screw_rpm = Rpm::new(self.process.speed_rpm()).ok();
+    }
+}
