@@ -281,6 +281,10 @@ fn of_note(note: &Note) -> String {
                                their time constants"
                 .to_owned()
         }
+        Note::DeadTimeToAStep { dead_time_s } => format!(
+            "the dead time of {dead_time_s:.4} s is told to a whole step only: the form passes its \
+             input straight through"
+        ),
         Note::Undetermined(name) => format!("the data do not determine {name}"),
     }
 }

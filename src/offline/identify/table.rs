@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::{Study, form};
-use crate::identify::fit::{Fit, Row};
+use crate::identify::fit::{Fit, Note, Row};
 
 /// A short table.
 pub fn text(study: &Study) -> String {
@@ -97,13 +97,16 @@ fn parameters(text: &mut String, study: &Study) {
         );
     }
     if fit.parameter("dead_time_s").is_none() {
-        let dead_time = format!(
-            "{:<18}{:>12}{:>14}  s",
-            "dead_time_s",
-            significant(fit.model.dead_time_s()),
+        let to_a_step = |note: &Note| matches!(note, Note::DeadTimeToAStep { .. });
+        let known = if fit.notes.contains(&Note::NoDeadTime) {
+            "none shows"
+        } else if fit.notes.iter().any(to_a_step) {
+            "to a step"
+        } else {
             "given"
-        );
-        put(text, "", &dead_time);
+        };
+        let dead_time = significant(fit.model.dead_time_s());
+        put(text, "", &format!("{:<18}{dead_time:>12}{known:>14}  s", "dead_time_s"));
     }
     put(text, "", &transfer(fit));
 }
