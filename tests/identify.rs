@@ -151,6 +151,8 @@ fn profiles_are_written_as_a_cell_plays_them() {
     assert!(said(&mut excite(steps), 0).contains("20 to 40 rpm"));
     let unit = said(&mut excite("steps --levels 1,2 --hold-s 1 --quantity speed"), 2);
     assert!(unit.contains("ends with its unit"), "{unit}");
+    let endless = said(&mut excite("gaussian --low 2 --high 4 --hold-s 1 --quantity drive_v"), 2);
+    assert!(endless.contains("tell --duration-s"), "{endless}");
     let flat = said(&mut excite("prbs --low 4 --high 4 --hold-s 1 --quantity rpm"), 2);
     assert!(flat.contains("levels from 4 to 4"), "{flat}");
 }

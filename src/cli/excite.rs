@@ -121,6 +121,10 @@ pub fn run(args: &ExciteArgs) -> Result<()> {
             let shape = Shape::Prbs { bits, low: prbs.low, high: prbs.high };
             (shape, f64::midpoint(prbs.low, prbs.high), &prbs.all)
         }
+        Kind::Gaussian(gaussian) if gaussian.all.duration_s.is_none() => {
+            let what = "random levels go on for ever: tell --duration-s";
+            return Err(WrongArguments::new(what).into());
+        }
         Kind::Gaussian(gaussian) => {
             let &GaussianArgs { low, high, seed, .. } = gaussian;
             let mean = gaussian.mean.unwrap_or(f64::midpoint(low, high));

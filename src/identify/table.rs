@@ -31,7 +31,8 @@ pub enum TableError {
     },
     /// A cell that is no finite number.
     #[error(
-        "line {line}, column {column}: found {}, expected a number{}", shown(.found), and_more(*.others)
+        "line {line}, column {column}: found {}, expected a number{}{}", shown(.found), point(.found),
+        and_more(*.others)
     )]
     Cell {
         /// Its line.
@@ -47,6 +48,11 @@ pub enum TableError {
 
 fn shown(found: &str) -> String {
     if found.is_empty() { "nothing".to_owned() } else { format!("\"{found}\"") }
+}
+
+/// A comma that was meant as a point.
+fn point(found: &str) -> &'static str {
+    if number(&found.replace(',', ".")).is_some() { " with a decimal point" } else { "" }
 }
 
 fn and_more(count: usize) -> String {
@@ -187,6 +193,12 @@ mod tests {
         assert_eq!(
             error,
             "line 3, column rpm: found \"NaN\", expected a number (and 3 more such cells)"
+        );
+        let table = Table::parse("time_s;rpm\n0;1,5\n").unwrap();
+        let error = table.column("rpm").unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "line 2, column rpm: found \"1,5\", expected a number with a decimal point"
         );
         let table = Table::parse("time_s,rpm\n0,\n").unwrap();
         let error = table.column("rpm").unwrap_err().to_string();
