@@ -11,6 +11,7 @@ use super::report::whole_page;
 use crate::config::Problems;
 use crate::extruder::adaptive::SubSystemError;
 use crate::extruder::feedforward::FeedforwardError;
+use crate::extruder::pressure::PressureError;
 use crate::model::ModelError;
 use crate::sim::bcs_thesis::fit_table::FitTableError;
 use crate::sim::cell::SimError;
@@ -20,6 +21,7 @@ pub mod barjuei2022;
 pub mod bcs_thesis;
 pub mod diagne2015;
 pub mod looey2026;
+pub mod ma2026;
 pub mod table;
 
 /// One quantity of one experiment.
@@ -52,6 +54,8 @@ pub enum Source {
     BcsThesis,
     /// Diagne et al. 2015: a screw with a delay that depends on time and state.
     Diagne2015,
+    /// Ma et al. 2026: pressure at the nozzle.
+    Ma2026,
     /// Mohammadi Looey et al. 2026: adaptive law of nozzle and plate.
     Looey2026,
 }
@@ -84,6 +88,9 @@ pub enum ReproduceError {
     /// A screw's run cannot be made.
     #[error("the screw: {0}")]
     Screw(#[from] crate::sim::diagne2015::run::RunError),
+    /// A pressure loop cannot be set up.
+    #[error(transparent)]
+    Pressure(#[from] PressureError),
     /// An adaptive law cannot be set up.
     #[error(transparent)]
     Adaptive(#[from] SubSystemError),
@@ -124,8 +131,8 @@ pub struct Section {
 
 impl Source {
     /// All of them, in the order of the page.
-    pub const ALL: [Self; 4] =
-        [Self::Barjuei2022, Self::BcsThesis, Self::Diagne2015, Self::Looey2026];
+    pub const ALL: [Self; 5] =
+        [Self::Barjuei2022, Self::BcsThesis, Self::Diagne2015, Self::Ma2026, Self::Looey2026];
 
     /// The name that `reproduce.json` and the command line have.
     pub const fn name(self) -> &'static str {
@@ -133,6 +140,7 @@ impl Source {
             Self::Barjuei2022 => "barjuei2022",
             Self::BcsThesis => "bcs-thesis",
             Self::Diagne2015 => "diagne2015",
+            Self::Ma2026 => "ma2026",
             Self::Looey2026 => "looey2026",
         }
     }
@@ -143,6 +151,7 @@ impl Source {
             Self::Barjuei2022 => "Shojaei Barjuei et al. 2022: width by robot speed",
             Self::BcsThesis => "bead characterisation thesis: extruder models, speed by flow",
             Self::Diagne2015 => "Diagne et al. 2015: screw with a delay of time and state",
+            Self::Ma2026 => "Ma et al. 2026: pressure at the nozzle",
             Self::Looey2026 => "Mohammadi Looey et al. 2026: adaptive law of nozzle and plate",
         }
     }
@@ -153,6 +162,7 @@ impl Source {
             Self::Barjuei2022 => barjuei2022::EXPERIMENTS,
             Self::BcsThesis => bcs_thesis::EXPERIMENTS,
             Self::Diagne2015 => diagne2015::EXPERIMENTS,
+            Self::Ma2026 => ma2026::EXPERIMENTS,
             Self::Looey2026 => looey2026::EXPERIMENTS,
         }
     }
@@ -167,6 +177,7 @@ impl Source {
             Self::Barjuei2022 => barjuei2022::run(effort, progress),
             Self::BcsThesis => bcs_thesis::run(effort, progress),
             Self::Diagne2015 => diagne2015::run(progress),
+            Self::Ma2026 => ma2026::run(effort, progress),
             Self::Looey2026 => looey2026::run(effort, progress),
         }
     }

@@ -192,6 +192,12 @@ impl Tried {
     }
 }
 
+impl std::fmt::Display for Tried {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
 impl Experiment {
     /// From rest to [`STEP_MPA`].
     pub fn step(factors: Factors) -> Self {
