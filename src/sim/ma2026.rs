@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use super::pressure::{Disturbed, Drift, Load, Plant, TICK_S};
+use super::pressure::{Disturbed, Drift, Load, Plant};
 use crate::extruder::pressure::kalman::Noise;
 use crate::extruder::pressure::pi::{Pi, PiGains};
 use crate::extruder::pressure::predictive::Predictive;
@@ -14,6 +14,12 @@ use crate::extruder::pressure::vsfc::{Vsfc, VsfcGains};
 use crate::extruder::pressure::{Fopdt, Limits, PressureError, PressureLaw, Running};
 use crate::time::Stamp;
 use crate::units::{MPa, Rpm};
+
+pub mod course;
+pub mod margins;
+
+pub use course::{Course, LoadFigures, StepFigures};
+pub use margins::{Margins, margins};
 
 /// Variance of a reading \[MPa²\] (the exponent's sign is misprinted in the
 /// paper).
@@ -97,19 +103,6 @@ impl Factors {
 /// The model that every law is given.
 pub fn model() -> Result<Fopdt, PressureError> {
     Factors::NONE.process()
-}
-
-/// What a run came to.
-#[derive(Debug, Clone, Default)]
-pub struct Course {
-    /// Time \[s\], tick by tick.
-    pub time_s: Vec<f64>,
-    /// What was wanted \[MPa\].
-    pub target: Vec<f64>,
-    /// The true pressure \[MPa\].
-    pub pressure: Vec<f64>,
-    /// Speed of the screw \[rpm\].
-    pub speed: Vec<f64>,
 }
 
 /// An experiment.
@@ -292,138 +285,6 @@ impl Experiment {
             plant.command(law.step(now, target).speed);
         }
     }
-}
-
-/// What a step response came to.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StepFigures {
-    /// Highest pressure beyond the target \[% of it\].
-    pub overshoot: f64,
-    /// From the command to 90 % of the target \[s\]; none where it never gets
-    /// there.
-    pub rise_s: Option<f64>,
-    /// Integral of the error's size \[MPa·s\].
-    pub iae: f64,
-}
-
-/// What a step of the load came to, for each MPa that it would come to.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LoadFigures {
-    /// Largest error.
-    pub peak: f64,
-    /// Integral of the error's size \[s\].
-    pub iae: f64,
-}
-
-impl Course {
-    /// The figures of a step from rest to its last target.
-    pub fn step_figures(&self) -> StepFigures {
-        let target = self.target.last().copied().unwrap_or_default();
-        let highest = self.pressure.iter().copied().fold(0.0, f64::max);
-        let iae = self.errors().map(|error| error.abs() * TICK_S).sum();
-        StepFigures {
-            overshoot: (highest / target - 1.0) * 100.0,
-            rise_s: self.passes(0.9 * target),
-            iae,
-        }
-    }
-
-    /// When the pressure first passes a value on its way up \[s\].
-    fn passes(&self, value: f64) -> Option<f64> {
-        let after = self.pressure.iter().position(|pressure| *pressure >= value)?;
-        let [low, high] = [self.pressure.get(after.checked_sub(1)?)?, self.pressure.get(after)?];
-        let before_s = self.time_s.get(after - 1)?;
-        Some(before_s + TICK_S * (value - low) / (high - low))
-    }
-
-    /// The figures of a step of the load that came after `at_s`.
-    pub fn load_figures(&self, at_s: f64) -> LoadFigures {
-        let since = self.errors().zip(&self.time_s).filter(|(_, t)| **t >= at_s);
-        let (mut peak, mut iae) = (0.0_f64, 0.0);
-        for (error, _) in since {
-            peak = peak.max(error.abs() / LOAD_RPM);
-            iae += error.abs() / LOAD_RPM * TICK_S;
-        }
-        LoadFigures { peak, iae }
-    }
-
-    /// Root mean square and largest size of the error after `from_s` \[MPa\].
-    pub fn tracking(&self, from_s: f64) -> (f64, f64) {
-        let errors = self.after(from_s, self.errors());
-        (mean(errors.iter().map(|e| e * e)).sqrt(), errors.iter().fold(0.0, |m, e| m.max(e.abs())))
-    }
-
-    /// Standard deviation of the pressure \[MPa\] and variation of the speed
-    /// \[%\] after `from_s`.
-    pub fn steadiness(&self, from_s: f64) -> (f64, f64) {
-        let (_, sigma) = spread(&self.after(from_s, self.pressure.iter().copied()));
-        let (mean, deviation) = spread(&self.after(from_s, self.speed.iter().copied()));
-        (sigma, 100.0 * deviation / mean)
-    }
-
-    fn errors(&self) -> impl Iterator<Item = f64> {
-        self.pressure.iter().zip(&self.target).map(|(pressure, target)| pressure - target)
-    }
-
-    fn after(&self, from_s: f64, values: impl Iterator<Item = f64>) -> Vec<f64> {
-        values.zip(&self.time_s).filter(|(_, t)| **t >= from_s).map(|(value, _)| value).collect()
-    }
-}
-
-/// How far a process may be from the model until a law no longer comes to rest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Margins {
-    /// Gain over that of the model.
-    pub gain: f64,
-    /// Dead time beyond that of the model \[s\].
-    pub dead_time_s: f64,
-}
-
-/// The margins of a law, tried out: 40 s after a step of the load the pressure
-/// still swings by more than 5 kPa.
-pub fn margins(tried: Tried) -> Result<Margins, PressureError> {
-    let gain = largest(1.0, 12.0, |gain| rests(tried, Factors { gain, ..Factors::NONE }))?;
-    let dead_time =
-        largest(1.0, 12.0, |dead_time| rests(tried, Factors { dead_time, ..Factors::NONE }))?;
-    Ok(Margins { gain, dead_time_s: (dead_time - 1.0) * DEAD_TIME_S })
-}
-
-fn rests(tried: Tried, factors: Factors) -> Result<bool, PressureError> {
-    let mut experiment = Experiment::load(factors);
-    let rpm = LOAD_RPM / factors.gain;
-    experiment.disturbed.load = Some(Load { at_s: 5.0, rpm });
-    experiment.takes_s = 60.0;
-    let (sigma, _) = experiment.run(tried)?.steadiness(45.0);
-    Ok(sigma < 0.005)
-}
-
-/// Where a property that holds at `low` ends, to a percent.
-fn largest(
-    low: f64,
-    high: f64,
-    mut holds: impl FnMut(f64) -> Result<bool, PressureError>,
-) -> Result<f64, PressureError> {
-    let (mut low, mut high) = (low, high);
-    while high / low > 1.01 {
-        let middle = (low * high).sqrt();
-        if holds(middle)? {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    Ok(low)
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a count of ticks")]
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
-    sum / count.max(1) as f64
-}
-
-fn spread(values: &[f64]) -> (f64, f64) {
-    let middle = mean(values.iter().copied());
-    (middle, mean(values.iter().map(|value| (value - middle).powi(2))).sqrt())
 }
 
 #[cfg(test)]

@@ -1,3 +1,4 @@
+use super::course::mean;
 use super::*;
 
 fn step(tried: Tried, factors: Factors) -> StepFigures {

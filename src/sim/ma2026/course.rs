@@ -1,0 +1,109 @@
+//! What a run came to, and its figures as the paper has them.
+
+use super::LOAD_RPM;
+use crate::sim::pressure::TICK_S;
+
+/// What a run came to.
+#[derive(Debug, Clone, Default)]
+pub struct Course {
+    /// Time \[s\], tick by tick.
+    pub time_s: Vec<f64>,
+    /// What was wanted \[MPa\].
+    pub target: Vec<f64>,
+    /// The true pressure \[MPa\].
+    pub pressure: Vec<f64>,
+    /// Speed of the screw \[rpm\].
+    pub speed: Vec<f64>,
+}
+
+/// What a step response came to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepFigures {
+    /// Highest pressure beyond the target \[% of it\].
+    pub overshoot: f64,
+    /// From the command to 90 % of the target \[s\]; none where it never gets
+    /// there.
+    pub rise_s: Option<f64>,
+    /// Integral of the error's size \[MPa·s\].
+    pub iae: f64,
+}
+
+/// What a step of the load came to, for each MPa that it would come to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoadFigures {
+    /// Largest error.
+    pub peak: f64,
+    /// Integral of the error's size \[s\].
+    pub iae: f64,
+}
+
+impl Course {
+    /// The figures of a step from rest to its last target.
+    pub fn step_figures(&self) -> StepFigures {
+        let target = self.target.last().copied().unwrap_or_default();
+        let highest = self.pressure.iter().copied().fold(0.0, f64::max);
+        let iae = self.errors().map(|error| error.abs() * TICK_S).sum();
+        StepFigures {
+            overshoot: rounded((highest / target - 1.0) * 100.0),
+            rise_s: self.passes(0.9 * target),
+            iae,
+        }
+    }
+
+    /// When the pressure first passes a value on its way up \[s\].
+    fn passes(&self, value: f64) -> Option<f64> {
+        let after = self.pressure.iter().position(|pressure| *pressure >= value)?;
+        let [low, high] = [self.pressure.get(after.checked_sub(1)?)?, self.pressure.get(after)?];
+        let before_s = self.time_s.get(after - 1)?;
+        Some(before_s + TICK_S * (value - low) / (high - low))
+    }
+
+    /// The figures of a step of the load that came after `at_s`.
+    pub fn load_figures(&self, at_s: f64) -> LoadFigures {
+        let since = self.errors().zip(&self.time_s).filter(|(_, t)| **t >= at_s);
+        let (mut peak, mut iae) = (0.0_f64, 0.0);
+        for (error, _) in since {
+            peak = peak.max(error.abs() / LOAD_RPM);
+            iae += error.abs() / LOAD_RPM * TICK_S;
+        }
+        LoadFigures { peak, iae }
+    }
+
+    /// Root mean square and largest size of the error after `from_s` \[MPa\].
+    pub fn tracking(&self, from_s: f64) -> (f64, f64) {
+        let errors = self.after(from_s, self.errors());
+        (mean(errors.iter().map(|e| e * e)).sqrt(), errors.iter().fold(0.0, |m, e| m.max(e.abs())))
+    }
+
+    /// Standard deviation of the pressure \[MPa\] and variation of the speed
+    /// \[%\] after `from_s`.
+    pub fn steadiness(&self, from_s: f64) -> (f64, f64) {
+        let (_, sigma) = spread(&self.after(from_s, self.pressure.iter().copied()));
+        let (mean, deviation) = spread(&self.after(from_s, self.speed.iter().copied()));
+        (sigma, 100.0 * deviation / mean)
+    }
+
+    fn errors(&self) -> impl Iterator<Item = f64> {
+        self.pressure.iter().zip(&self.target).map(|(pressure, target)| pressure - target)
+    }
+
+    fn after(&self, from_s: f64, values: impl Iterator<Item = f64>) -> Vec<f64> {
+        values.zip(&self.time_s).filter(|(_, t)| **t >= from_s).map(|(value, _)| value).collect()
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a count of ticks")]
+pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
+    sum / count.max(1) as f64
+}
+
+/// To a thousandth: what is less is how the last step of an approach falls.
+fn rounded(percent: f64) -> f64 {
+    (percent * 1e3).round() / 1e3
+}
+
+fn spread(values: &[f64]) -> (f64, f64) {
+    let middle = mean(values.iter().copied());
+    (middle, mean(values.iter().map(|value| (value - middle).powi(2))).sqrt())
+}
