@@ -46,8 +46,8 @@ impl Cycle {
 }
 
 #[divan::bench(args = [Tried::Pi, Tried::Vsfc, Tried::SmithPi, Tried::Predictive])]
-fn cycle(bencher: Bencher<'_, '_>, tried: &Tried) {
-    let mut cycle = Cycle::new(*tried);
+fn cycle(bencher: Bencher<'_, '_>, tried: Tried) {
+    let mut cycle = Cycle::new(tried);
     bencher.bench_local(|| cycle.run());
 }
 
