@@ -25,6 +25,9 @@ use crate::extruder::{
 use crate::time::{Span, Stamp};
 use crate::units::{Mm, MmPerS};
 
+/// Share of the setpoint at which a robot that starts has run up.
+const RUN_UP: f64 = 0.95;
+
 /// Everything the controller has to know of its cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setup {
@@ -85,6 +88,8 @@ pub struct Controller {
     verdict: Verdict,
     /// Where on the path the bead began.
     bead_start: Mm,
+    /// Whether the robot has reached the speed that it was told on this bead.
+    run_up: bool,
     /// The last setpoint of this bead, and when it was given.
     told: Option<(Stamp, MmPerS)>,
     limit: Limit,
@@ -104,6 +109,7 @@ impl Controller {
             follow: Follow::default(),
             verdict: Verdict::Follows,
             bead_start: Mm::ZERO,
+            run_up: false,
             told: None,
             limit: Limit::None,
         }
@@ -162,7 +168,10 @@ impl Controller {
             _ if self.ended => Laying::Stopped,
             Phase::Priming | Phase::Tracking { .. } | Phase::Holding { .. } => {
                 let told = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
-                let robot = self.robot.map(|robot| (told, robot.speed_mm_per_s));
+                // No extruder keeps up with a robot that starts; it is ready for
+                // the speed that comes.
+                let robot = self.robot.filter(|_| self.run_up);
+                let robot = robot.map(|robot| (told, robot.speed_mm_per_s));
                 Laying::Bead(demand.wanted(robot))
             }
         }
@@ -363,6 +372,7 @@ impl Controller {
 
     fn become_idle(&mut self) {
         self.phase = Phase::Idle;
+        self.run_up = false;
         self.told = None;
         self.limit = Limit::None;
         self.follow.reset();
@@ -385,6 +395,8 @@ impl Controller {
             self.bead_start = state.path_mm;
             self.phase = Phase::Priming;
         }
+        let told = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
+        self.run_up |= state.speed_mm_per_s >= told * RUN_UP;
         if let Some((_, told)) = self.told {
             self.verdict = self.follow.observe(now, told, state.speed_mm_per_s);
         }

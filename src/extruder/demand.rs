@@ -4,16 +4,20 @@ use crate::units::{Mm, Mm2, Mm3PerS, MmPerS};
 
 /// Most by which a robot that moves faster than it was told raises the flow.
 const MOST: f64 = 1.5;
+/// Share of the setpoint by which the speed may differ before the flow follows:
+/// a robot is always a little behind a setpoint that changes, and a flow that
+/// followed that would undo some of the width controller's work.
+const SLACK: f64 = 0.05;
 
 /// What the flow goes by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Follows {
     /// The start speed alone: the flow is the same all along the bead.
     StartSpeed,
-    /// The robot, as far as it moves slower or faster than it was told: at the
-    /// beginning of a bead, and where it slows down by itself. What the width
-    /// controller adds or takes away is left out, for a flow that followed it
-    /// would undo it.
+    /// The robot, as far as it moves slower or faster than it was told, once it
+    /// has run up: where it slows down by itself. What the width controller
+    /// adds or takes away is left out, for a flow that followed it would undo
+    /// it.
     Robot,
 }
 
@@ -62,10 +66,22 @@ impl FlowDemand {
     pub fn wanted(&self, robot: Option<(MmPerS, MmPerS)>) -> Mm3PerS {
         match (self.follows, robot) {
             (Follows::Robot, Some((told, moves))) if told > MmPerS::ZERO => {
-                self.nominal() * (moves / told).clamp(0.0, MOST)
+                self.nominal() * followed(moves / told).clamp(0.0, MOST)
             }
             _ => self.nominal(),
         }
+    }
+}
+
+/// The share that the flow goes by: 1 within the slack, nothing where the
+/// robot stands, without a step between.
+fn followed(share: f64) -> f64 {
+    if share < 1.0 - SLACK {
+        share / (1.0 - SLACK)
+    } else if share > 1.0 + SLACK {
+        share - SLACK
+    } else {
+        1.0
     }
 }
 
@@ -92,7 +108,10 @@ mod tests {
         };
         let speeds = |told, moves| Some((MmPerS::constant(told), MmPerS::constant(moves)));
         assert_eq!(flow(Follows::Robot, speeds(80.0, 80.0)), 400.0);
-        assert_eq!(flow(Follows::Robot, speeds(100.0, 50.0)), 200.0);
+        assert_eq!(flow(Follows::Robot, speeds(80.0, 77.0)), 400.0);
+        assert_eq!(flow(Follows::Robot, speeds(80.0, 83.0)), 400.0);
+        assert!((flow(Follows::Robot, speeds(100.0, 47.5)) - 200.0).abs() < 1e-9);
+        assert_eq!(flow(Follows::Robot, speeds(100.0, 0.0)), 0.0);
         assert_eq!(flow(Follows::Robot, speeds(100.0, 900.0)), 600.0);
         assert_eq!(flow(Follows::Robot, None), 400.0);
         assert_eq!(flow(Follows::StartSpeed, speeds(100.0, 50.0)), 400.0);

@@ -9,6 +9,7 @@ use super::phase::split;
 use super::rank;
 use super::sheet::Sheet;
 
+mod clip;
 mod curved;
 mod flank;
 mod shape;
