@@ -120,6 +120,36 @@ fn nothing_winds_up_while_the_target_is_out_of_reach() {
 }
 
 #[test]
+fn a_limit_beyond_its_own_that_a_law_is_told_of_winds_nothing_up() {
+    const CAP: f64 = 0.9;
+    for which in 0..4 {
+        let start = running(0.6, 0.6, 0.6);
+        let (name, mut law) = laws(free(), start).into_iter().nth(which).unwrap();
+        let mut plant = Plant::new(model(), Disturbed::default(), FASTEST, start);
+        let mut falls_s = None;
+        for tick in 0..12_000_u64 {
+            let now = Stamp::from_secs(plant.now_s());
+            if tick.is_multiple_of(4) {
+                law.measured(now, plant.read()).unwrap();
+            }
+            if tick.is_multiple_of(10) {
+                let target = if plant.now_s() < 30.0 { 1.5 } else { 0.6 };
+                let speed = law.step(now, MPa::constant(target)).speed;
+                let applied = speed.min(Rpm::constant(CAP));
+                law.settle(now, applied);
+                plant.command(applied);
+                if target < 1.0 && falls_s.is_none() && applied.get() < CAP {
+                    falls_s = Some(plant.now_s());
+                }
+            }
+            plant.advance();
+        }
+        assert!(falls_s.unwrap() < 31.0, "{name}: {falls_s:?}");
+        assert!((plant.pressure() - 0.6).abs() < 0.025, "{name}: {}", plant.pressure());
+    }
+}
+
+#[test]
 fn commands_keep_the_rate_and_ours_keeps_its_foresight_under_it() {
     let limits = Limits::new(Rpm::constant(0.1), Rpm::constant(2.0), 1.5).unwrap();
     let start = running(0.1, 0.1, 0.1);
