@@ -10,7 +10,7 @@
 //! | wandering | σ²/4 each τ | drift over many lags is followed, noise is not |
 //! | load | 8.5·σ | what a step of the load is taken for before it is measured |
 //! | evidence | 3.65 | a load of 0.1 MPa in the paper's noise is seen after 0.14 s; one false sign in some 25 s, which is taken back |
-//! | tunnel | 0.3 within 5·σ, all from 10·σ | a drift within the noise moves the screw little |
+//! | tunnel | 0.3 within 5·σ, all from 10·σ | a drift within the noise moves the screw little; at most 3.5·σ of it stay in the pressure |
 //! | caution | 1.45 standard deviations, 2·σ beyond the target | on its way to a target the pressure that may be there, not only the likeliest, is kept from passing it |
 
 use super::kalman::Noise;
