@@ -144,6 +144,7 @@ mod tests {
     fn a_feed_that_slips_is_learnt_until_the_flow_is_the_wanted_one() {
         assert!((after(20.0, 0.0) - 1000.0).abs() < 0.1);
         assert!((after(40.0, -0.004) - 1000.0).abs() < 1.0);
-        assert!(after(0.5, -0.004) < 900.0);
+        // ë + a·ė + 4e = 0 leaves 94.6 mm³/s less at half a second.
+        assert!((after(0.5, -0.004) - 905.4).abs() < 8.0);
     }
 }

@@ -91,7 +91,7 @@ fn about(seeds: u64) -> String {
     format!(
         "Means over {seeds} seeds; the section is judged about its own mean from 15 to 90 s. Off, \
          the simulated sections scatter more than the published ones, because the thesis does not \
-         say how its voltage was distributed; widths follow from sections at a height of 3.65 mm, \
+         say how far its voltage went; widths follow from sections at a height of 3.65 mm, \
          while the thesis' bead changed its shape as well. Of the 17 % that no model tells, the \
          thesis' feedforward leaves all; ours reads the melt pressure at 50 Hz (noise of Ma et al. \
          2026) and supposes that the unmodelled flow shows in it. A camera alone comes too late: \
