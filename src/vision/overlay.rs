@@ -9,7 +9,6 @@ use super::phase::split;
 use super::rank;
 use super::sheet::Sheet;
 
-mod clip;
 mod curved;
 mod flank;
 mod shape;

@@ -228,9 +228,6 @@ impl Tracer {
         self.read(scene);
         self.overlay.lay(&self.sheet);
         let noise = f64::from(scene.noise) / f64::from(typical(&self.step).abs());
-        if self.overlay.is_spotted(noise) {
-            self.overlay.leave_out_sparks(noise);
-        }
         self.seen = self.overlay.look(table, noise, self.room(scene));
         self.look_for_texture(scene, noise);
         self.seen.map(|seen| (seen.step.blur, seen.blur_sd))
