@@ -86,6 +86,9 @@ pub trait Strategy {
     /// the wish stays as it is.
     fn answer(&mut self, now: Stamp, dt: Span, report: &ExtruderReport) -> Result<(), Unusable>;
 
+    /// Time passes while the last command is kept.
+    fn wait(&mut self, _dt: Span) {}
+
     /// What it would like now.
     fn wish(&self) -> Wish;
 
@@ -136,3 +139,6 @@ impl Law {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -12,8 +12,9 @@
 //! in the paper; what a law foresees from its own commands is exact at any
 //! rate, so that a feedforward at 200 Hz is the same call made more often.
 //! Every law is a plain struct that is given the time, allocates nothing in
-//! these two calls and never leaves its [`Limits`].
+//! these two calls and never leaves its [`super::limits::CommandLimits`] \[rpm\].
 
+use super::limits::{CommandLimit, LimitError};
 use crate::time::{Span, Stamp};
 use crate::units::{MPa, Rpm};
 
@@ -23,7 +24,6 @@ pub mod calls;
 pub mod history;
 pub mod jump;
 pub mod kalman;
-pub mod limits;
 pub mod pi;
 pub mod predictive;
 pub mod reference;
@@ -36,7 +36,6 @@ pub mod zone;
 mod tests;
 
 pub use calls::Running;
-pub use limits::{Command, Limit, Limits};
 
 /// The longest dead time and lag that are taken \[s\].
 pub const LONGEST_S: f64 = 60.0;
@@ -55,13 +54,8 @@ pub enum PressureError {
         wanted: &'static str,
     },
     /// Limits that leave nothing between them.
-    #[error("the screw's speed is limited to {min} … {max}: the first must be below the second")]
-    Limits {
-        /// Lower limit.
-        min: Rpm,
-        /// Upper limit.
-        max: Rpm,
-    },
+    #[error("the screw's speed [rpm]: {0}")]
+    Limits(#[from] LimitError),
     /// Too little to tell the noise from.
     #[error("the noise was to be told from {found} readings: at least {wanted} are needed")]
     TooFew {
@@ -133,6 +127,15 @@ impl Fopdt {
     pub const fn dead_time_s(&self) -> f64 {
         self.dead_time_s
     }
+}
+
+/// A command to the screw, within the limits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Command {
+    /// Speed to turn at.
+    pub speed: Rpm,
+    /// The limit that shaped it.
+    pub limit: CommandLimit,
 }
 
 /// A law of the pressure loop.

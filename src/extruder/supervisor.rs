@@ -200,8 +200,13 @@ impl Supervisor {
         self.lose_patience(now);
         match self.phase {
             Phase::Running => self.drive(now, dt, flow),
-            Phase::Holding { why: ExtruderHold::BadReading, .. } => self.ask_again(now),
-            _ => {}
+            Phase::Holding { why, .. } => {
+                self.setup.law.strategy_mut().wait(dt);
+                if why == ExtruderHold::BadReading {
+                    self.ask_again(now);
+                }
+            }
+            Phase::Off | Phase::Starting { .. } | Phase::Fault(_) => {}
         }
     }
 

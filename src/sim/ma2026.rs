@@ -5,13 +5,14 @@
 use std::f64::consts::TAU;
 
 use super::pressure::{Disturbed, Drift, Load, Plant};
+use crate::extruder::CommandLimits;
 use crate::extruder::pressure::kalman::Noise;
 use crate::extruder::pressure::pi::{Pi, PiGains};
 use crate::extruder::pressure::predictive::Predictive;
 use crate::extruder::pressure::smith::SmithPi;
 use crate::extruder::pressure::tuning::Tuning;
 use crate::extruder::pressure::vsfc::{Vsfc, VsfcGains};
-use crate::extruder::pressure::{Fopdt, Limits, PressureError, PressureLaw, Running};
+use crate::extruder::pressure::{Fopdt, PressureError, PressureLaw, Running};
 use crate::time::Stamp;
 use crate::units::{MPa, Rpm};
 
@@ -166,7 +167,7 @@ impl Tried {
     pub fn law(self, running: Running) -> Result<Box<dyn PressureLaw>, PressureError> {
         let model = model()?;
         let noise = Noise::new(WANDER_MPA2, NOISE_MPA2)?;
-        let limits = Limits::new(Rpm::ZERO, Rpm::constant(3.0), 1e6)?;
+        let limits = CommandLimits::new(0.0, 3.0, 1e6)?;
         Ok(match self {
             Self::Pi => Box::new(Pi::new(PiGains::MA2026, noise, limits, running)),
             Self::Vsfc => {

@@ -4,13 +4,12 @@
 use super::About;
 use crate::config::table::Table;
 use crate::extruder::law::{PressureChoice, PressureSettings};
+use crate::extruder::pressure::Fopdt;
 use crate::extruder::pressure::kalman::Noise;
 use crate::extruder::pressure::pi::PiGains;
 use crate::extruder::pressure::tuning::Tuning;
 use crate::extruder::pressure::vsfc::VsfcGains;
-use crate::extruder::pressure::{Fopdt, Limits};
 use crate::extruder::rheology::PowerLaw;
-use crate::units::Rpm;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Word {
@@ -64,7 +63,7 @@ pub(super) fn read(table: &Table<'_>, about: &About<'_>) -> Option<PressureSetti
         model: model?,
         noise: noise?,
         nozzle: nozzle?,
-        limits: limits(table, about)?,
+        limits: about.limits?,
     })
 }
 
@@ -81,13 +80,6 @@ fn read_pi(table: &Table<'_>) -> Option<PiGains> {
     let integral = integral?;
     let tracking = table.number_or("tracking_time_s", 1e-3..=1e4, integral);
     told(table, "kp_rpm_per_mpa", PiGains::new(kp?, integral, tracking?))
-}
-
-fn limits(table: &Table<'_>, about: &About<'_>) -> Option<Limits> {
-    let limits = about.limits?;
-    let (min, max) = limits.range();
-    let limits = Limits::new(Rpm::new(min).ok()?, Rpm::new(max).ok()?, limits.rate_per_s());
-    told(table, "law", limits)
 }
 
 fn told<T, E: std::fmt::Display>(

@@ -3,12 +3,13 @@
 //! holds it. Ma et al. 2026.
 
 use super::{Need, Strategy, Unusable, Wish};
+use crate::extruder::limits::CommandLimits;
 use crate::extruder::pressure::kalman::Noise;
 use crate::extruder::pressure::pi::{Pi, PiGains};
 use crate::extruder::pressure::predictive::Predictive;
 use crate::extruder::pressure::tuning::Tuning;
 use crate::extruder::pressure::vsfc::{Vsfc, VsfcGains};
-use crate::extruder::pressure::{Fopdt, Limits, PressureLaw, Running};
+use crate::extruder::pressure::{Fopdt, PressureLaw, Running};
 use crate::extruder::report::ExtruderReport;
 use crate::extruder::rheology::PowerLaw;
 use crate::time::{Span, Stamp};
@@ -38,7 +39,7 @@ pub struct PressureSettings {
     /// From pressure to flow.
     pub nozzle: PowerLaw,
     /// What the screw may be told.
-    pub limits: Limits,
+    pub limits: CommandLimits,
 }
 
 /// The loop with its memory.

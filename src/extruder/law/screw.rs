@@ -41,6 +41,10 @@ impl Strategy for ScrewFill {
     }
 
     fn foresee(&mut self, dt: Span, _flow: Mm3PerS) {
+        self.wait(dt);
+    }
+
+    fn wait(&mut self, dt: Span) {
         self.turned = self.turned + dt.max(Span::ZERO);
     }
 

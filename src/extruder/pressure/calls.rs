@@ -1,8 +1,9 @@
 //! What every law of the pressure loop keeps of its calls: the times of
 //! readings and commands, and the command in force.
 
-use super::{Command, Limit, Limits, Refused};
-use crate::time::Stamp;
+use super::{Command, Refused};
+use crate::extruder::limits::{CommandLimit, CommandLimits};
+use crate::time::{Span, Stamp};
 use crate::units::{MPa, Rpm};
 
 /// What runs where a law takes over: the pressure, what is wanted, and the
@@ -20,6 +21,9 @@ pub struct Running {
 /// The largest size of a reading that laws take.
 pub const MOST: MPa = MPa::constant(1e6);
 
+/// Longer than anything runs \[s\].
+const EVER_S: f64 = 1e9;
+
 /// The times of a law's calls, and the command in force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Calls {
@@ -31,7 +35,7 @@ pub struct Calls {
 impl Calls {
     /// Before the first call.
     pub fn new(speed: Rpm) -> Self {
-        let last = Command { speed, limit: Limit::None };
+        let last = Command { speed, limit: CommandLimit::None };
         Self { read: None, stepped: None, last }
     }
 
@@ -65,10 +69,11 @@ impl Calls {
     }
 
     /// Takes note of a demand, and gives the command for it.
-    pub fn command(&mut self, limits: &Limits, demand_rpm: f64, dt_s: f64) -> Command {
+    pub fn command(&mut self, limits: &CommandLimits, demand_rpm: f64, dt_s: f64) -> Command {
         // The first command may come any time after the speed that ran.
-        let dt_s = if dt_s > 0.0 { dt_s } else { f64::MAX };
-        self.last = limits.apply(demand_rpm, self.last.speed.get(), dt_s);
+        let dt = Span::from_secs(if dt_s > 0.0 { dt_s } else { EVER_S });
+        let (speed, limit) = limits.apply(demand_rpm, self.last.speed.get(), dt);
+        self.last = Command { speed: Rpm::new(speed).unwrap_or_default(), limit };
         self.last
     }
 

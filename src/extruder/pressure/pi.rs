@@ -4,7 +4,8 @@
 
 use super::calls::{Calls, Running, sane};
 use super::kalman::{Kalman, Noise};
-use super::{Command, Limits, PressureError, PressureLaw, Refused, within};
+use super::{Command, PressureError, PressureLaw, Refused, within};
+use crate::extruder::limits::CommandLimits;
 use crate::time::Stamp;
 use crate::units::{MPa, Rpm};
 
@@ -51,7 +52,7 @@ impl PiGains {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pi {
     gains: PiGains,
-    limits: Limits,
+    limits: CommandLimits,
     kalman: Kalman,
     integral: f64,
     /// The last error \[MPa\] and what the law would have liked for it \[rpm\].
@@ -62,7 +63,7 @@ pub struct Pi {
 
 impl Pi {
     /// Takes over from what runs, without a bump.
-    pub fn new(gains: PiGains, noise: Noise, limits: Limits, running: Running) -> Self {
+    pub fn new(gains: PiGains, noise: Noise, limits: CommandLimits, running: Running) -> Self {
         let error = running.target.get() - running.pressure.get();
         Self {
             gains,

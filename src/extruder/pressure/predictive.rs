@@ -12,7 +12,8 @@ use super::calls::{Calls, Running};
 use super::history::History;
 use super::reference::{Reference, Way};
 use super::tuning::Tuning;
-use super::{Command, Fopdt, Limits, PressureLaw, Refused};
+use super::{Command, Fopdt, PressureLaw, Refused};
+use crate::extruder::limits::CommandLimits;
 use crate::time::{Span, Stamp};
 use crate::units::{MPa, Rpm};
 
@@ -21,7 +22,7 @@ use crate::units::{MPa, Rpm};
 pub struct Predictive {
     model: Fopdt,
     tuning: Tuning,
-    limits: Limits,
+    limits: CommandLimits,
     history: History,
     bank: Bank,
     reference: Reference,
@@ -33,7 +34,7 @@ pub struct Predictive {
 impl Predictive {
     /// Takes over from what runs, without a bump: what the pressure differs
     /// from the model is taken for a load.
-    pub fn new(model: Fopdt, tuning: Tuning, limits: Limits, running: Running) -> Self {
+    pub fn new(model: Fopdt, tuning: Tuning, limits: CommandLimits, running: Running) -> Self {
         let speed = running.speed.get();
         let load = running.pressure.get() - model.gain() * speed;
         Self {

@@ -7,7 +7,8 @@ use super::history::History;
 use super::kalman::{Kalman, Noise};
 use super::pi::PiGains;
 use super::reference::Reference;
-use super::{Command, Fopdt, Limits, PressureLaw, Refused};
+use super::{Command, Fopdt, PressureLaw, Refused};
+use crate::extruder::limits::CommandLimits;
 use crate::time::Stamp;
 use crate::units::{MPa, Rpm};
 
@@ -46,7 +47,7 @@ impl Smith {
 pub struct SmithPi {
     model: Fopdt,
     gains: PiGains,
-    limits: Limits,
+    limits: CommandLimits,
     kalman: Kalman,
     smith: Smith,
     reference: Reference,
@@ -64,7 +65,7 @@ impl SmithPi {
         gains: PiGains,
         reference_s: f64,
         noise: Noise,
-        limits: Limits,
+        limits: CommandLimits,
         running: Running,
     ) -> Self {
         let steady = running.pressure.get() / model.gain();

@@ -9,6 +9,7 @@ use super::smith::SmithPi;
 use super::tuning::Tuning;
 use super::vsfc::{Vsfc, VsfcGains};
 use super::*;
+use crate::extruder::limits::CommandLimits;
 use crate::sim::pressure::{Disturbed, Plant};
 use crate::units::{MPa, Rpm};
 
@@ -23,12 +24,12 @@ fn noise() -> Noise {
     Noise::new(2e-5, 4.98e-5).unwrap()
 }
 
-fn ours(limits: Limits, running: Running) -> Predictive {
+fn ours(limits: CommandLimits, running: Running) -> Predictive {
     let tuning = Tuning::of(&model(), &noise(), 0.1).unwrap();
     Predictive::new(model(), tuning, limits, running)
 }
 
-fn laws(limits: Limits, running: Running) -> [(&'static str, Box<dyn PressureLaw>); 4] {
+fn laws(limits: CommandLimits, running: Running) -> [(&'static str, Box<dyn PressureLaw>); 4] {
     let vsfc = VsfcGains::ma2026(noise()).unwrap();
     let smith = PiGains::new(1.0, 0.84, 1.0).unwrap();
     [
@@ -39,8 +40,8 @@ fn laws(limits: Limits, running: Running) -> [(&'static str, Box<dyn PressureLaw
     ]
 }
 
-fn free() -> Limits {
-    Limits::new(Rpm::ZERO, FASTEST, 1e6).unwrap()
+fn free() -> CommandLimits {
+    CommandLimits::new(0.0, FASTEST.get(), 1e6).unwrap()
 }
 
 fn running(pressure: f64, target: f64, speed: f64) -> Running {
@@ -151,7 +152,7 @@ fn a_limit_beyond_its_own_that_a_law_is_told_of_winds_nothing_up() {
 
 #[test]
 fn commands_keep_the_rate_and_ours_keeps_its_foresight_under_it() {
-    let limits = Limits::new(Rpm::constant(0.1), Rpm::constant(2.0), 1.5).unwrap();
+    let limits = CommandLimits::new(0.1, 2.0, 1.5).unwrap();
     let start = running(0.1, 0.1, 0.1);
     for (name, mut law) in laws(limits, start) {
         let mut plant = Plant::new(model(), Disturbed::default(), FASTEST, start);
@@ -231,7 +232,7 @@ fn a_process_without_dead_time_is_held_as_well() {
     let process = Fopdt::new(0.02, 2.0, 0.0).unwrap();
     let noise = Noise::new(1e-6, 1e-4).unwrap();
     let tuning = Tuning::of(&process, &noise, 0.1).unwrap();
-    let limits = Limits::new(Rpm::ZERO, Rpm::constant(300.0), 1e6).unwrap();
+    let limits = CommandLimits::new(0.0, 300.0, 1e6).unwrap();
     let start = running(1.0, 1.0, 50.0);
     let mut law = Predictive::new(process, tuning, limits, start);
     let mut plant = Plant::new(process, Disturbed::default(), Rpm::constant(300.0), start);
@@ -250,7 +251,7 @@ proptest! {
             1..80,
         ),
     ) {
-        let limits = Limits::new(Rpm::constant(-1.0), FASTEST, 5.0).unwrap();
+        let limits = CommandLimits::new(-1.0, FASTEST.get(), 5.0).unwrap();
         for (name, mut law) in laws(limits, running(0.3, 0.4, 0.5)) {
             let mut now = Stamp::START;
             for (ns, reading, target, step) in &calls {

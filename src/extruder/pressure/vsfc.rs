@@ -6,7 +6,8 @@ use super::calls::{Calls, Running, sane};
 use super::kalman::{Kalman, Noise};
 use super::reference::FIRST_S;
 use super::smith::Smith;
-use super::{Command, Fopdt, Limits, PressureError, PressureLaw, Refused, within};
+use super::{Command, Fopdt, PressureError, PressureLaw, Refused, within};
+use crate::extruder::limits::CommandLimits;
 use crate::time::Stamp;
 use crate::units::{MPa, Rpm};
 
@@ -60,7 +61,7 @@ impl VsfcGains {
 pub struct Vsfc {
     gains: VsfcGains,
     gain: f64,
-    limits: Limits,
+    limits: CommandLimits,
     kalman: Kalman,
     smith: Smith,
     integral: f64,
@@ -74,7 +75,7 @@ impl Vsfc {
         model: Fopdt,
         gains: VsfcGains,
         noise: Noise,
-        limits: Limits,
+        limits: CommandLimits,
         running: Running,
     ) -> Self {
         let error = running.target.get() - running.pressure.get();
