@@ -13,6 +13,7 @@ pub use played::{Constant, Played};
 pub use pressure::{PressureChoice, PressureLoop, PressureSettings};
 pub use screw::ScrewFill;
 
+use super::limits::CommandLimit;
 use super::report::ExtruderReport;
 use crate::time::{Span, Stamp};
 use crate::units::Mm3PerS;
@@ -89,11 +90,20 @@ pub trait Strategy {
     /// Time passes while the last command is kept.
     fn wait(&mut self, _dt: Span) {}
 
+    /// Goes on from a command that was kept for a while. Nothing is gathered of
+    /// that time.
+    fn resume(&mut self, now: Stamp, applied: f64);
+
+    /// The limit that shaped the wish already.
+    fn limit(&self) -> CommandLimit {
+        CommandLimit::None
+    }
+
     /// What it would like now.
     fn wish(&self) -> Wish;
 
     /// Learns what became of its wish, so that nothing winds up against a
-    /// limit, and that a law which was held goes on from what was applied.
+    /// limit.
     fn settle(&mut self, now: Stamp, applied: f64);
 }
 

@@ -29,19 +29,16 @@ impl Rate {
 
     /// Whether it is due at `now`; the first call is, and sets the grid.
     pub fn due(&mut self, now: Stamp) -> bool {
-        let Some(mut next) = self.next else {
+        let Some(next) = self.next else {
             self.next = Some(now + self.period);
             return true;
         };
         if now < next {
             return false;
         }
-        if self.period > Span::ZERO {
-            while next <= now {
-                next = next + self.period;
-            }
-        }
-        self.next = Some(next);
+        let period = self.period.ns().max(1);
+        let missed = (now - next).ns() / period;
+        self.next = Some(next + Span::from_ns(period.saturating_mul(missed.saturating_add(1))));
         true
     }
 }

@@ -16,6 +16,8 @@ pub enum ExtruderHold {
     NoReading,
     /// What is reported cannot be true.
     BadReading,
+    /// The valve is shut although it was told to open.
+    ValveShut,
     /// The screw does not turn as it was told.
     SpeedMismatch,
 }

@@ -3,15 +3,14 @@
 //! width controller it is told what happened, and when.
 //!
 //! - off: no bead is laid.
-//! - starting: the pump was told to run; the law stands at the steady state of
-//!   the flow that is wanted.
+//! - starting: the pump was told to run; the law stands where it begins.
 //! - running: the law commands, within its limits.
 //! - holding: the last command is kept, for a reason; left when the reason
 //!   goes, and a fault when it stays too long.
 //! - fault: the pump is stopped; left when the robot is idle again.
 
 use super::Drive;
-use super::law::{Law, Unusable, Wish};
+use super::law::{Law, Need, Wish};
 use super::limits::{CommandLimit, CommandLimits};
 use super::rates::Rate;
 use super::report::{ExtruderCommand, ExtruderReport, PumpMode};
@@ -76,6 +75,14 @@ pub struct Supervisor {
     ticked: Option<Stamp>,
     controlled: Option<Stamp>,
     applied: f64,
+    /// When the bead began.
+    begun: Stamp,
+    /// Whether the last report can be true.
+    usable: bool,
+    /// Whether the valve stays open to let too high a pressure out.
+    relieving: bool,
+    /// Whether the pump was last told to run.
+    told_on: bool,
     trace: ExtruderTrace,
 }
 
@@ -93,6 +100,10 @@ impl Supervisor {
             follow: Follow::default(),
             ticked: None,
             controlled: None,
+            begun: Stamp::START,
+            usable: true,
+            relieving: false,
+            told_on: false,
             trace: ExtruderTrace::default(),
         }
     }
@@ -113,11 +124,6 @@ impl Supervisor {
         self.trace
     }
 
-    /// The time from one tick to the next.
-    pub const fn period(&self) -> Span {
-        self.setup.feedforward_period
-    }
-
     /// The link to the extruder came up.
     pub fn link_came_up(&mut self) {
         self.link_up = true;
@@ -134,18 +140,25 @@ impl Supervisor {
     pub fn reported(&mut self, now: Stamp, report: &ExtruderReport) {
         self.link_up = true;
         self.report = Some((now, *report));
+        let too_high = self.setup.max_pressure.zip(report.pressure_mpa);
+        let too_high = too_high.is_some_and(|(limit, found)| found > limit);
+        self.relieving &= too_high;
         if self.phase == Phase::Off || matches!(self.phase, Phase::Fault(_)) {
             return;
         }
-        let too_high = |limit: MPa| report.pressure_mpa.is_some_and(|found| found > limit);
-        if self.setup.max_pressure.is_some_and(too_high) {
+        if too_high {
+            self.relieving = true;
             self.phase = Phase::Fault(ExtruderFault::Overpressure);
             return;
         }
         match report.pump {
             PumpMode::Fault => self.phase = Phase::Fault(ExtruderFault::Pump),
             PumpMode::On => self.runs(now, report),
-            PumpMode::Starting => {}
+            PumpMode::Starting => self.starts_anew(now),
+            // A report may still tell of the time before the pump was told to run.
+            PumpMode::Off | PumpMode::Stopping if now - self.begun <= self.setup.max_gap => {
+                self.starts_anew(self.begun);
+            }
             PumpMode::Off | PumpMode::Stopping => {
                 if !matches!(self.phase, Phase::Starting { .. }) {
                     self.phase = Phase::Fault(ExtruderFault::Pump);
@@ -158,16 +171,18 @@ impl Supervisor {
     /// due, and at once when the pump is to stop.
     pub fn tick(&mut self, now: Stamp, laying: Laying) -> Option<ExtruderCommand> {
         let dt = self.ticked.replace(now).map_or(Span::ZERO, |last| now - last);
-        let before = self.state();
         match laying {
             Laying::Bead(flow) => self.lay(now, dt, flow),
             Laying::Stopped if matches!(self.phase, Phase::Fault(_)) => {}
             Laying::Stopped | Laying::Idle => self.rest(),
         }
-        let stopped = before != self.state()
-            && matches!(self.phase, Phase::Off | Phase::Fault(_))
-            && before != ExtruderState::Off;
-        (self.io.due(now) || stopped).then(|| self.command()).filter(|_| self.link_up)
+        let command = self.command();
+        let stops = self.told_on && !command.pump_on;
+        if !(self.io.due(now) || stops) || !self.link_up {
+            return None;
+        }
+        self.told_on = command.pump_on;
+        Some(command)
     }
 
     /// The run is being ended: the pump stops now.
@@ -178,10 +193,9 @@ impl Supervisor {
 
     fn command(&self) -> ExtruderCommand {
         let on = !matches!(self.phase, Phase::Off | Phase::Fault(_));
-        // A valve that shuts on too high a pressure keeps it in.
-        let relieve = self.phase == Phase::Fault(ExtruderFault::Overpressure);
         let value = if on { self.applied } else { self.setup.limits.idle() };
-        ExtruderCommand { pump_on: on, valve_open: on || relieve, value }
+        // A valve that shuts on too high a pressure keeps it in.
+        ExtruderCommand { pump_on: on, valve_open: on || self.relieving, value }
     }
 
     fn rest(&mut self) {
@@ -202,18 +216,20 @@ impl Supervisor {
             Phase::Running => self.drive(now, dt, flow),
             Phase::Holding { why, .. } => {
                 self.setup.law.strategy_mut().wait(dt);
-                if why == ExtruderHold::BadReading {
-                    self.ask_again(now);
+                if why == ExtruderHold::BadReading && self.usable && self.answer(now) == Some(true)
+                {
+                    self.resume(now);
                 }
             }
             Phase::Off | Phase::Starting { .. } | Phase::Fault(_) => {}
         }
     }
 
-    /// Stands at the steady state of the flow that is wanted. The first
-    /// command of a bead is no change of another and has no rate.
+    /// Stands where the law begins. The first command of a bead is no change
+    /// of another and has no rate.
     fn begin(&mut self, now: Stamp, flow: Mm3PerS) {
         self.phase = Phase::Starting { since: now };
+        self.begun = now;
         let wish = self.setup.law.strategy_mut().begin(now, flow);
         let (low, high) = self.setup.limits.range();
         self.applied = if wish.value.is_finite() {
@@ -222,40 +238,41 @@ impl Supervisor {
             self.setup.limits.idle()
         };
         self.note(wish, CommandLimit::None);
-        self.setup.law.strategy_mut().settle(now, self.applied);
+    }
+
+    /// The pump says that it is starting: a law that runs would wind up against
+    /// a flow that does not come.
+    fn starts_anew(&mut self, since: Stamp) {
+        if matches!(self.phase, Phase::Running | Phase::Holding { .. }) {
+            self.phase = Phase::Starting { since };
+        }
     }
 
     fn drive(&mut self, now: Stamp, dt: Span, flow: Mm3PerS) {
         self.setup.law.strategy_mut().foresee(dt, flow);
-        if !self.answer(now) {
+        if self.answer(now) == Some(false) {
+            self.usable = false;
             self.hold(now, ExtruderHold::BadReading);
             return;
         }
         let law = self.setup.law.strategy_mut();
         let wish = law.wish();
         let (applied, limit) = self.setup.limits.apply(wish.value, self.applied, dt);
+        let limit = if limit == CommandLimit::None { law.limit() } else { limit };
         law.settle(now, applied);
         self.applied = applied;
         self.note(wish, limit);
     }
 
-    /// Lets the law answer the last report where that is due; false where the
-    /// report cannot be true.
-    fn answer(&mut self, now: Stamp) -> bool {
-        let Some((_, report)) = self.report else { return true };
+    /// Lets the law answer the last report where that is due, and says whether
+    /// the report can be true.
+    fn answer(&mut self, now: Stamp) -> Option<bool> {
+        let (_, report) = self.report?;
         if !self.control.due(now) {
-            return true;
+            return None;
         }
         let since = self.controlled.replace(now).map_or(Span::ZERO, |last| now - last);
-        self.setup.law.strategy_mut().answer(now, since, &report).is_ok()
-    }
-
-    /// Whether reports have become usable again.
-    fn ask_again(&mut self, now: Stamp) {
-        let before = self.controlled;
-        if self.answer(now) && self.controlled != before {
-            self.phase = Phase::Running;
-        }
+        Some(self.setup.law.strategy_mut().answer(now, since, &report).is_ok())
     }
 
     fn note(&mut self, wish: Wish, limit: CommandLimit) {
@@ -266,22 +283,28 @@ impl Supervisor {
 
     /// The pump runs: a start is over, or the screw turns as it was told.
     fn runs(&mut self, now: Stamp, report: &ExtruderReport) {
+        if !report.valve_open {
+            self.hold(now, ExtruderHold::ValveShut);
+            return;
+        }
         if matches!(self.phase, Phase::Starting { .. }) {
             self.phase = Phase::Running;
             self.controlled = None;
+            self.setup.law.strategy_mut().settle(now, self.applied);
         }
+        self.resume_from(now, ExtruderHold::ValveShut);
         if self.setup.drive == Drive::Rpm
             && let Some(turning) = report.screw_rpm
         {
             match self.follow.observe_share(now, turning.get(), self.applied) {
                 Verdict::Lost => self.phase = Phase::Fault(ExtruderFault::SpeedMismatch),
                 Verdict::Mismatch => self.hold(now, ExtruderHold::SpeedMismatch),
-                _ => self.resume_from(ExtruderHold::SpeedMismatch),
+                _ => self.resume_from(now, ExtruderHold::SpeedMismatch),
             }
         }
-        self.resume_from(ExtruderHold::LinkDown);
+        self.resume_from(now, ExtruderHold::LinkDown);
         if self.has_what_is_needed(report) {
-            self.resume_from(ExtruderHold::NoReading);
+            self.resume_from(now, ExtruderHold::NoReading);
             self.hear(now, report);
         }
     }
@@ -289,14 +312,16 @@ impl Supervisor {
     /// Lets the law hear a report; one that cannot be true is a hold until one
     /// comes that can.
     fn hear(&mut self, now: Stamp, report: &ExtruderReport) {
-        match self.setup.law.strategy_mut().hear(now, report) {
-            Ok(()) => {}
-            Err(Unusable) => self.hold(now, ExtruderHold::BadReading),
+        self.usable = self.setup.law.strategy_mut().hear(now, report).is_ok();
+        if !self.usable {
+            self.hold(now, ExtruderHold::BadReading);
         }
     }
 
+    /// A limit on the pressure is no limit where the pressure is not reported.
     fn has_what_is_needed(&self, report: &ExtruderReport) -> bool {
         self.setup.law.strategy().needs().iter().all(|need| need.met_by(report))
+            && (self.setup.max_pressure.is_none() || Need::Pressure.met_by(report))
     }
 
     /// Holds when reports stay out, and gives up when a hold or a start lasts
@@ -324,13 +349,18 @@ impl Supervisor {
         }
     }
 
-    /// The reason for a hold has gone. The law goes on from the command that
-    /// was kept, for it has learned that one.
-    fn resume_from(&mut self, reason: ExtruderHold) {
+    fn resume_from(&mut self, now: Stamp, reason: ExtruderHold) {
         if matches!(self.phase, Phase::Holding { why, .. } if why == reason) {
-            self.phase = Phase::Running;
-            self.controlled = None;
+            self.resume(now);
         }
+    }
+
+    /// The reason for a hold has gone. The law goes on from the command that
+    /// was kept, and gathers nothing of the time between.
+    fn resume(&mut self, now: Stamp) {
+        self.phase = Phase::Running;
+        self.controlled = None;
+        self.setup.law.strategy_mut().resume(now, self.applied);
     }
 }
 

@@ -47,6 +47,7 @@ pub const fn extruder_hold(hold: ExtruderHold) -> &'static str {
         ExtruderHold::LinkDown => "link_down",
         ExtruderHold::NoReading => "no_reading",
         ExtruderHold::BadReading => "bad_reading",
+        ExtruderHold::ValveShut => "valve_shut",
         ExtruderHold::SpeedMismatch => "speed_mismatch",
     }
 }

@@ -11,6 +11,9 @@ use crate::extruder::pressure::tuning::Tuning;
 use crate::extruder::pressure::vsfc::VsfcGains;
 use crate::extruder::rheology::PowerLaw;
 
+/// The laws remember as many commands a second.
+const MOST_HZ: f64 = 250.0;
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Word {
     Predictive,
@@ -47,6 +50,10 @@ pub(super) fn read(table: &Table<'_>, about: &About<'_>) -> Option<PressureSetti
     let word = table.choice("law", &WORDS);
     if word.is_none() {
         table.pass_over();
+    }
+    if about.rates.feedforward_hz > MOST_HZ {
+        let found = format!("a pressure loop at {} Hz", about.rates.feedforward_hz);
+        table.report("law", found, format!("feedforward_rate_hz of at most {MOST_HZ}"));
     }
     let noise = told(table, "sensor_noise_mpa", Noise::new(wander?, sigma?.powi(2)));
     let choice = match word? {

@@ -4,6 +4,7 @@
 use super::About;
 use crate::config::table::Table;
 use crate::extruder::screw::control::{Scheme, ScrewSettings};
+use crate::extruder::screw::feasible::Feasibility;
 use crate::extruder::screw::law::Setpoint;
 use crate::extruder::screw::{
     FillLaw, PiecewiseExponential, Pulsation, Saturated, Screw, ScrewDesign, TurnUnit,
@@ -70,12 +71,17 @@ pub(super) fn read_law(table: &Table<'_>, about: &About<'_>) -> Option<ScrewSett
         }
         LawWord::Saturated => Saturated::new(&screw, setpoint, slope).map(FillLaw::Saturated),
     };
+    let verdict = Feasibility::judge(&screw);
+    if !verdict.is_feasible() {
+        table.report("pulsation_share", "a screw whose feed may never arrive", verdict.to_string());
+    }
     match law {
         Ok(law) => Some(ScrewSettings {
             screw,
             law,
             scheme: Scheme::Exact,
-            period: Span::from_secs(1.0 / about.rates.control_hz),
+            // What is fed may change at every tick while a limit acts.
+            period: Span::from_secs(1.0 / about.rates.feedforward_hz),
             before: law.hold(),
         }),
         Err(error) => {

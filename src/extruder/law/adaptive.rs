@@ -74,7 +74,10 @@ impl Strategy for AdaptiveNozzle {
         let (measured, known) = (self.speed(flow), self.nozzle.pressure_kg_per_s);
         if !self.begun {
             self.begun = true;
+            // The flow is no steady one yet; what was learnt before still holds.
+            let learnt = self.law.estimate();
             self.law.start(measured, self.wish.value, known);
+            self.law.know(learnt);
         }
         let action = self.law.step(measured, self.reference, known, dt);
         let feedforward = self.holding(action.model);
@@ -85,6 +88,11 @@ impl Strategy for AdaptiveNozzle {
 
     fn wish(&self) -> Wish {
         self.wish
+    }
+
+    fn resume(&mut self, _now: Stamp, applied: f64) {
+        self.begun = false;
+        self.law.settle(applied);
     }
 
     fn settle(&mut self, _now: Stamp, applied: f64) {

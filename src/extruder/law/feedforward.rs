@@ -3,6 +3,7 @@
 
 use super::{Strategy, Unusable, Wish};
 use crate::extruder::feedforward::Inverse;
+use crate::extruder::limits::CommandLimit;
 use crate::extruder::report::ExtruderReport;
 use crate::time::{Span, Stamp};
 use crate::units::Mm3PerS;
@@ -22,6 +23,7 @@ pub struct OperatingPoint {
 pub struct Foreseen {
     inverse: Inverse,
     about: OperatingPoint,
+    wanted: Mm3PerS,
     command: f64,
 }
 
@@ -29,7 +31,7 @@ impl Foreseen {
     /// Before its first bead. The inverse takes and gives differences from the
     /// operating point, its limits included.
     pub const fn new(inverse: Inverse, about: OperatingPoint) -> Self {
-        Self { inverse, about, command: 0.0 }
+        Self { inverse, about, wanted: Mm3PerS::ZERO, command: 0.0 }
     }
 
     fn off(&self, flow: Mm3PerS) -> f64 {
@@ -39,6 +41,7 @@ impl Foreseen {
 
 impl Strategy for Foreseen {
     fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> Wish {
+        self.wanted = flow;
         let off = self.off(flow);
         let command = off / self.inverse.gain();
         // Only a model that integrates has no steady state, and such a one has
@@ -49,6 +52,7 @@ impl Strategy for Foreseen {
     }
 
     fn foresee(&mut self, _dt: Span, flow: Mm3PerS) {
+        self.wanted = flow;
         self.command = self.about.command + self.inverse.step(self.off(flow));
     }
 
@@ -58,6 +62,15 @@ impl Strategy for Foreseen {
 
     fn wish(&self) -> Wish {
         Wish::known(self.command)
+    }
+
+    fn resume(&mut self, _now: Stamp, applied: f64) {
+        let _ = self.inverse.start(self.off(self.wanted), applied - self.about.command);
+        self.command = applied;
+    }
+
+    fn limit(&self) -> CommandLimit {
+        self.inverse.limit()
     }
 
     fn settle(&mut self, _now: Stamp, applied: f64) {

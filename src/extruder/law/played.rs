@@ -26,6 +26,8 @@ impl Strategy for Constant {
         Wish::known(self.0)
     }
 
+    fn resume(&mut self, _now: Stamp, _applied: f64) {}
+
     fn settle(&mut self, _now: Stamp, _applied: f64) {}
 }
 
@@ -60,6 +62,8 @@ impl Strategy for Played {
     fn wish(&self) -> Wish {
         Wish::known(self.profile.at(self.at_s))
     }
+
+    fn resume(&mut self, _now: Stamp, _applied: f64) {}
 
     fn settle(&mut self, _now: Stamp, _applied: f64) {}
 }

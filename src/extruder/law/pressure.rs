@@ -3,7 +3,7 @@
 //! holds it. Ma et al. 2026.
 
 use super::{Need, Strategy, Unusable, Wish};
-use crate::extruder::limits::CommandLimits;
+use crate::extruder::limits::{CommandLimit, CommandLimits};
 use crate::extruder::pressure::kalman::Noise;
 use crate::extruder::pressure::pi::{Pi, PiGains};
 use crate::extruder::pressure::predictive::Predictive;
@@ -48,7 +48,10 @@ pub struct PressureLoop {
     settings: PressureSettings,
     running: Option<Holder>,
     target: MPa,
+    /// Speed of the screw that a hold has kept \[rpm\].
+    kept: Option<f64>,
     told: f64,
+    limit: CommandLimit,
 }
 
 /// The law that holds the pressure of a bead.
@@ -85,7 +88,14 @@ impl Holder {
 impl PressureLoop {
     /// Before its first bead.
     pub const fn new(settings: PressureSettings) -> Self {
-        Self { settings, running: None, target: MPa::ZERO, told: 0.0 }
+        Self {
+            settings,
+            running: None,
+            target: MPa::ZERO,
+            kept: None,
+            told: 0.0,
+            limit: CommandLimit::None,
+        }
     }
 
     /// The pressure for a flow; the last one where the power law has none.
@@ -105,15 +115,19 @@ impl Strategy for PressureLoop {
         self.aim(flow);
         // The screw stands until the pump runs; the law takes over from there,
         // for it knows how a pressure rises.
-        (self.running, self.told) = (None, 0.0);
+        (self.running, self.kept, self.told) = (None, None, 0.0);
         self.wish()
     }
 
     fn hear(&mut self, now: Stamp, report: &ExtruderReport) -> Result<(), Unusable> {
         let pressure = report.pressure_mpa.ok_or(Unusable)?;
         let settings = &self.settings;
+        // What presses while the screw stood was left by the last bead: as if the
+        // screw had turned for it until now, for it falls as that would.
+        let before = self.kept.unwrap_or(pressure.get().max(0.0) / settings.model.gain());
+        let speed = Rpm::new(before).map_err(|_| Unusable)?;
         let holder = self.running.get_or_insert_with(|| {
-            Holder::new(settings, Running { pressure, target: pressure, speed: Rpm::ZERO })
+            Holder::new(settings, Running { pressure, target: pressure, speed })
         });
         holder.law().measured(now, pressure).map_err(|_| Unusable)
     }
@@ -123,8 +137,11 @@ impl Strategy for PressureLoop {
     }
 
     fn answer(&mut self, now: Stamp, _dt: Span, _report: &ExtruderReport) -> Result<(), Unusable> {
-        let holder = self.running.as_mut().ok_or(Unusable)?;
-        self.told = holder.law().step(now, self.target).speed.get();
+        // Before the first report there is nothing to answer.
+        if let Some(holder) = &mut self.running {
+            let command = holder.law().step(now, self.target);
+            (self.told, self.limit) = (command.speed.get(), command.limit);
+        }
         Ok(())
     }
 
@@ -133,11 +150,18 @@ impl Strategy for PressureLoop {
         Wish { value: self.told, feedforward, feedback: self.told - feedforward }
     }
 
+    fn resume(&mut self, _now: Stamp, applied: f64) {
+        // The laws keep the time of their calls; one that is made anew gathers
+        // nothing of the time between.
+        (self.running, self.kept, self.told) = (None, Some(applied), applied);
+    }
+
+    fn limit(&self) -> CommandLimit {
+        self.limit
+    }
+
     fn settle(&mut self, now: Stamp, applied: f64) {
-        // What differs from the command is what the law must hear of.
-        if (applied - self.told).abs() > 1e-9
-            && let (Some(holder), Ok(applied)) = (&mut self.running, Rpm::new(applied))
-        {
+        if let (Some(holder), Ok(applied)) = (&mut self.running, Rpm::new(applied)) {
             holder.law().settle(now, applied);
         }
     }

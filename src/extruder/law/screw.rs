@@ -5,7 +5,7 @@
 use super::{Need, Strategy, Unusable, Wish};
 use crate::extruder::report::ExtruderReport;
 use crate::extruder::screw::control::ScrewSettings;
-use crate::extruder::screw::{ScrewControl, ScrewError};
+use crate::extruder::screw::{ScrewControl, ScrewError, ScrewFault};
 use crate::time::{Span, Stamp};
 use crate::units::Mm3PerS;
 
@@ -50,12 +50,21 @@ impl Strategy for ScrewFill {
 
     fn answer(&mut self, _now: Stamp, _dt: Span, report: &ExtruderReport) -> Result<(), Unusable> {
         let plug = report.filled_mm.ok_or(Unusable)?;
-        self.fill = self.control.step(self.turned, plug).map_err(|_| Unusable)?.fill;
+        match self.control.step(self.turned, plug) {
+            Ok(step) => self.fill = step.fill,
+            // The screw has hardly turned since the last step.
+            Err(ScrewFault::TooSoon { .. }) => {}
+            Err(_) => return Err(Unusable),
+        }
         Ok(())
     }
 
     fn wish(&self) -> Wish {
         Wish { value: self.fill, feedforward: self.hold, feedback: self.fill - self.hold }
+    }
+
+    fn resume(&mut self, now: Stamp, applied: f64) {
+        self.settle(now, applied);
     }
 
     fn settle(&mut self, _now: Stamp, applied: f64) {

@@ -150,8 +150,10 @@ fn a_screw_that_does_not_turn_as_it_was_told_is_a_hold_then_a_fault() {
     bench.report = Some(report(PumpMode::On, 29.5));
     assert_eq!(bench.go(0.1), ExtruderState::Running);
     bench.report = Some(report(PumpMode::On, 0.0));
-    bench.go(2.2);
-    assert!(matches!(bench.side.state(), ExtruderState::Fault(_)));
+    assert_eq!(
+        bench.go(2.2),
+        ExtruderState::Fault(ExtruderFault::HeldTooLong(ExtruderHold::SpeedMismatch,))
+    );
 }
 
 #[test]
@@ -189,4 +191,51 @@ fn ending_a_run_stops_the_pump_at_once() {
     bench.go(0.5);
     assert!(!bench.side.stop().unwrap().pump_on);
     assert_eq!(bench.side.state(), ExtruderState::Off);
+}
+
+#[test]
+fn a_valve_that_stays_shut_is_a_hold_then_a_fault() {
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    bench.go(0.5);
+    bench.report = Some(ExtruderReport { valve_open: false, ..report(PumpMode::On, 30.0) });
+    assert_eq!(bench.go(0.1), ExtruderState::Holding(ExtruderHold::ValveShut));
+    bench.report = Some(report(PumpMode::On, 30.0));
+    assert_eq!(bench.go(0.1), ExtruderState::Running);
+    bench.report = Some(ExtruderReport { valve_open: false, ..report(PumpMode::On, 30.0) });
+    let fault = ExtruderFault::HeldTooLong(ExtruderHold::ValveShut);
+    assert_eq!(bench.go(1.2), ExtruderState::Fault(fault));
+}
+
+#[test]
+fn reports_of_the_time_before_the_pump_was_told_to_run_are_no_fault() {
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    bench.go(0.03);
+    assert_eq!(bench.side.state(), ExtruderState::Running);
+    bench.report = Some(report(PumpMode::Stopping, 30.0));
+    assert_eq!(bench.go(0.1), ExtruderState::Starting);
+    bench.report = Some(report(PumpMode::Starting, 0.0));
+    assert_eq!(bench.go(0.3), ExtruderState::Starting);
+    bench.report = Some(report(PumpMode::On, 30.0));
+    assert_eq!(bench.go(0.1), ExtruderState::Running);
+    bench.report = Some(report(PumpMode::Off, 0.0));
+    assert_eq!(bench.go(0.1), ExtruderState::Fault(ExtruderFault::Pump));
+}
+
+#[test]
+fn a_limit_on_the_pressure_needs_its_reading_and_lets_it_out_until_it_has_fallen() {
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    bench.go(0.5);
+    bench.report = Some(ExtruderReport { pressure_mpa: None, ..report(PumpMode::On, 30.0) });
+    assert_eq!(bench.go(0.1), ExtruderState::Holding(ExtruderHold::NoReading));
+    bench.report = Some(report(PumpMode::On, 30.0));
+    bench.go(0.1);
+    let high = ExtruderReport { pressure_mpa: MPa::new(2.5).ok(), ..report(PumpMode::On, 0.0) };
+    bench.report = Some(high);
+    bench.go(0.1);
+    bench.laying = Laying::Idle;
+    assert_eq!(bench.go(0.1), ExtruderState::Off);
+    assert!(bench.last().valve_open && !bench.last().pump_on);
+    bench.report = Some(report(PumpMode::Off, 0.0));
+    bench.go(0.1);
+    assert!(!bench.last().valve_open);
 }
