@@ -81,8 +81,8 @@ pub struct Supervisor {
     usable: bool,
     /// Whether the valve stays open to let too high a pressure out.
     relieving: bool,
-    /// Whether the pump was last told to run.
-    told_on: bool,
+    /// The last command that went out.
+    told: Option<ExtruderCommand>,
     trace: ExtruderTrace,
 }
 
@@ -103,7 +103,7 @@ impl Supervisor {
             begun: Stamp::START,
             usable: true,
             relieving: false,
-            told_on: false,
+            told: None,
             trace: ExtruderTrace::default(),
         }
     }
@@ -177,12 +177,12 @@ impl Supervisor {
             Laying::Stopped | Laying::Idle => self.rest(),
         }
         let command = self.command();
-        let stops = self.told_on && !command.pump_on;
+        let stops = self.told.is_some_and(|told| told.pump_on) && !command.pump_on;
         if !(self.io.due(now) || stops) || !self.link_up {
             return None;
         }
-        self.told_on = command.pump_on;
-        Some(command)
+        self.told = Some(command);
+        self.told
     }
 
     /// The run is being ended: the pump stops now.
