@@ -3,7 +3,12 @@
 use maud::{Markup, html};
 
 use crate::offline::names::spoken;
-use crate::offline::summary::{ControlSummary, Summary};
+use crate::offline::summary::{ControlSummary, ExtruderSummary, Summary};
+
+/// Share of what was wanted from which on an error is worth a word.
+const FAR_OFF: f64 = 0.05;
+/// Share of the time from which on a limit is.
+const LONG_LIMITED: f64 = 0.10;
 
 /// How a run went.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -39,6 +44,17 @@ pub fn verdict(summary: &Summary, max_rejected_share: f64) -> Verdict {
     if let Some(control) = &summary.control {
         let (control_level, more) = control_sentences(control);
         level = level.max(control_level);
+        sentences.extend(more);
+        if let Some(sentence) = far_off(control, summary) {
+            level = level.max(Level::Caution);
+            sentences.push(sentence);
+        }
+    }
+    if let Some(extruder) = &summary.extruder {
+        let more = extruder_sentences(extruder);
+        if !more.is_empty() {
+            level = level.max(Level::Caution);
+        }
         sentences.extend(more);
     }
     Verdict { level, text: sentences.join(" ") }
@@ -97,6 +113,50 @@ fn share_sentence(summary: &Summary, max_rejected_share: f64) -> String {
     } else {
         format!("{share:.1} % of {frames} frames{of_bead} were measured.")
     }
+}
+
+/// An error that nobody asked for: more than a twentieth of the target once
+/// settled, or a limit that acted for a tenth of the run.
+fn far_off(control: &ControlSummary, summary: &Summary) -> Option<String> {
+    let (error, target) = (control.width_error_rms_settled_mm?, summary.target_width_mm?);
+    let share = control.limited_s / summary.duration_s.unwrap_or(f64::INFINITY);
+    if error > FAR_OFF * target {
+        Some(format!("That is {:.0} % of the target.", 100.0 * error / target))
+    } else if share > LONG_LIMITED {
+        Some(format!("The robot stood at a limit for {:.0} % of the time.", 100.0 * share))
+    } else {
+        None
+    }
+}
+
+/// What the extruder side did that one should know; nothing where it did well.
+fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
+    let total: f64 = extruder.states_s.values().sum();
+    let share = |seconds: f64| seconds / total.max(1e-9);
+    let mut sentences = Vec::new();
+    for (why, seconds) in &extruder.held_for_s {
+        sentences.push(format!(
+            "The extruder kept its last command for {seconds:.1} s ({}).",
+            spoken(why)
+        ));
+    }
+    for (limit, seconds) in &extruder.limited_by_s {
+        if share(*seconds) > LONG_LIMITED {
+            sentences.push(format!(
+                "The extruder's command stood at a limit for {:.0} % of the time ({limit}).",
+                100.0 * share(*seconds)
+            ));
+        }
+    }
+    if let (Some(error), Some(mean)) =
+        (extruder.flow_error_mean_mm3_per_s, extruder.flow_mean_mm3_per_s)
+        && error.abs() > FAR_OFF * mean.abs().max(1e-9)
+    {
+        sentences.push(format!(
+            "The flow was {error:+.1} mm³/s off on average, {mean:.1} mm³/s flowed."
+        ));
+    }
+    sentences
 }
 
 fn control_sentences(control: &ControlSummary) -> (Level, Vec<String>) {

@@ -27,6 +27,8 @@ pub struct ExtruderSummary {
     /// Root mean square of flow less wanted flow while bead was laid, where a
     /// simulation knows the flow or a sensor tells it.
     pub flow_error_rms_mm3_per_s: Option<f64>,
+    /// Mean of flow less wanted flow.
+    pub flow_error_mean_mm3_per_s: Option<f64>,
     /// Mean of that flow.
     pub flow_mean_mm3_per_s: Option<f64>,
 }
@@ -85,6 +87,7 @@ impl ExtruderTally {
             limited_by_s: seconds(&self.limited_by),
             fault_reasons: self.fault_reasons.clone(),
             flow_error_rms_mm3_per_s: self.error.rms(),
+            flow_error_mean_mm3_per_s: self.error.mean(),
             flow_mean_mm3_per_s: self.flow.mean(),
         })
     }
