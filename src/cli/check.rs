@@ -45,10 +45,12 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     say!("  suffices for process, render");
     match Cell::parse(&args.cell, &loaded.text, Purpose::Run) {
         Ok(cell) => {
-            say!("  suffices for run, simulate");
+            let with_extruder = cell.run.as_ref().is_some_and(|run| run.extruder.is_some());
+            say!("  suffices for {}", if with_extruder { "simulate" } else { "run, simulate" });
             if let Some(run) = &cell.run {
                 about_run(run);
             }
+            about_extruder(&LoadedCell { cell, ..loaded })?;
         }
         Err(missing) => {
             say!("  not for run, simulate; these need besides:");
@@ -120,6 +122,24 @@ fn about_surface(loaded: &LoadedCell) {
         );
         say!("               less well than sigma_mm says");
     }
+}
+
+/// Tells of the extruder side, with all that it refers to.
+fn about_extruder(loaded: &LoadedCell) -> anyhow::Result<()> {
+    let part = loaded.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
+    let Some(part) = part else { return Ok(()) };
+    let (extruder, unit) = (&part.extruder, part.extruder.drive.unit());
+    let (low, high) = extruder.limits.range();
+    say!(
+        "  extruder     told {low} to {high} {unit}, {:.1} mm³/s wanted",
+        part.demand.nominal().get()
+    );
+    if part.plant.is_some() {
+        let _ = loaded.simulated_extruder()?;
+    } else {
+        say!("  WARNING      [extruder_plant] is missing: nothing answers in a simulation");
+    }
+    Ok(())
 }
 
 fn about_run(run: &RunPart) {

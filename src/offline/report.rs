@@ -65,7 +65,9 @@ impl Report<'_> {
             (headline::tiles(self.summary))
             (sections::over_time(self))
             (sections::over_path(self))
-            @if let Some(drive) = self.extruder { (self.charts.extruder.section(drive)) }
+            @if let Some(drive) = self.extruder {
+                (self.charts.extruder.section(drive, self.summary.extruder.as_ref()))
+            }
             (sections::rejections(self))
             (sections::pictures(self))
             (sections::hints(self))

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{About, adaptive, keys, pressure, screw};
+use super::{ANY, About, adaptive, keys, pressure, screw};
 use crate::config::table::Table;
 use crate::extruder::Drive;
 use crate::extruder::adaptive::Law as AdaptiveLaw;
@@ -92,7 +92,8 @@ impl Strategy {
         match word? {
             Word::Constant => {
                 let key = keys(about.drive).value;
-                let range = about.limits.map_or((f64::MIN, f64::MAX), |limits| limits.range());
+                let range =
+                    about.limits.map_or((*ANY.start(), *ANY.end()), |limits| limits.range());
                 table.number(key, range.0..=range.1).map(|value| Self::Constant { value })
             }
             Word::Profile => {

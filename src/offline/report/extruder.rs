@@ -13,6 +13,7 @@ use super::strips::{self, Row};
 use crate::control::{Event, Step};
 use crate::extruder::{Drive, ExtruderReport, ExtruderState};
 use crate::offline::names;
+use crate::offline::summary::ExtruderSummary;
 use crate::time::Stamp;
 use crate::units::Mm3PerS;
 
@@ -72,7 +73,7 @@ impl ExtruderCharts {
     }
 
     /// The section of the page, for an extruder that is told this drive.
-    pub fn section(&self, drive: Drive) -> Markup {
+    pub fn section(&self, drive: Drive, summary: Option<&ExtruderSummary>) -> Markup {
         let Some(range) = self.command.extent() else { return html! {} };
         let axis = XAxis::time(range);
         let told = format!("command [{}]", drive.unit());
@@ -84,12 +85,18 @@ impl ExtruderCharts {
                     Row { name: "state", strip: &self.states, ink: palette::state },
                     Row { name: "limit", strip: &self.limits, ink: limit },
                 ]))
+                (legend(&[
+                    ("off", palette::IDLE, "block"), ("starting", palette::PRIMING, "block"),
+                    ("running", palette::TRACKING, "block"), ("holding", palette::HOLDING, "block"),
+                    ("fault", palette::FAULT, "block"), ("a limit acts", palette::LIMIT, "block"),
+                ]))
                 (self.command_plot(&axis, &told, drive == Drive::Rpm))
                 (sensor(&axis, &self.pressure, "pressure [MPa]", palette::PRESSURE))
                 @if drive != Drive::Rpm {
                     (sensor(&axis, &self.screw, "screw [rpm]", palette::SCREW))
                 }
                 (sensor(&axis, &self.filled, "filled length [mm]", palette::MODEL))
+                @if let Some(summary) = summary { (times(summary)) }
             }
         }
     }
@@ -132,6 +139,34 @@ impl ExtruderCharts {
             layers,
         };
         html! { (legend(&entries)) (plot.draw()) }
+    }
+}
+
+/// How long what held.
+fn times(summary: &ExtruderSummary) -> Markup {
+    let total: f64 = summary.states_s.values().sum();
+    let row = |what: &str, name: &str, seconds: f64| {
+        html! { tr {
+            td { (what) } td { (names::spoken(name)) }
+            td.number { (format!("{seconds:.1} s")) }
+            td.number { (format!("{:.1} %", 100.0 * seconds / total.max(1e-9))) }
+        } }
+    };
+    html! {
+        table {
+            thead { tr { th { "" } th { "" } th.number { "time" } th.number { "share" } } }
+            tbody {
+                @for (name, seconds) in &summary.states_s { (row("state", name, *seconds)) }
+                @for (name, seconds) in &summary.held_for_s {
+                    (row("held because of", name, *seconds))
+                }
+                @for (name, seconds) in &summary.limited_by_s { (row("limit", name, *seconds)) }
+                @for (name, count) in &summary.fault_reasons { tr {
+                    td { "fault" } td { (names::spoken(name)) }
+                    td.number { (count) " ×" } td {}
+                } }
+            }
+        }
     }
 }
 

@@ -203,8 +203,14 @@ pub fn tiles(summary: &Summary) -> Markup {
                 (tile("error, settled", &number(control.width_error_rms_settled_mm, 2), "mm RMS",
                     &format!("{} mm RMS over all", number(control.width_error_rms_mm, 2))))
                 (tile("faults", &control.faults.to_string(), "", &format!("held {:.1} s, limited {:.1} s", control.held_s, control.limited_s)))
-                (tile("latency, 99 %", &number(control.latency_ms.p99, 2), "ms",
-                    &format!("median {}, longest {}", number(control.latency_ms.p50, 2), number(control.latency_ms.max, 2))))
+                @if control.latency_ms.p99.is_some() {
+                    (tile("latency, 99 %", &number(control.latency_ms.p99, 2), "ms",
+                        &format!("median {}, longest {}", number(control.latency_ms.p50, 2), number(control.latency_ms.max, 2))))
+                }
+                @if let Some(extruder) = &summary.extruder {
+                    (tile("flow", &number(extruder.flow_mean_mm3_per_s, 0), "mm³/s",
+                        &format!("{} mm³/s RMS from what was wanted", number(extruder.flow_error_rms_mm3_per_s, 0))))
+                }
             } @else {
                 (tile("uncertainty", &number(summary.sigma_mean_mm, 3), "mm", "mean standard deviation"))
                 (tile("contrast", &number(summary.hints.contrast_median_grey, 0), "grey levels", "median, of 256"))

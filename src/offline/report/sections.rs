@@ -184,6 +184,10 @@ fn data_uri(jpeg: &[u8]) -> String {
 pub fn hints(report: &Report<'_>) -> Markup {
     let charts = report.charts;
     let Some(range) = charts.contrast.extent() else { return html! {} };
+    // Widths that were simulated without a picture have no hints.
+    if charts.contrast.range().is_none_or(|(_, most)| most <= 0.0) {
+        return html! {};
+    }
     let axis = if charts.timed == Some(true) { XAxis::time(range) } else { XAxis::frames(range) };
     // A steady hint is drawn as steady, not as its last digits.
     let small = |series: &Series, least_top: f64, y_title: &str| {
