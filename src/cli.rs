@@ -96,7 +96,7 @@ enum Command {
     Check(check::CheckArgs),
     Offset(offset::OffsetArgs),
     Excite(excite::ExciteArgs),
-    Identify(identify::IdentifyArgs),
+    Identify(Box<identify::IdentifyArgs>),
     Models(models::ModelsArgs),
 }
 

@@ -16,4 +16,5 @@ pub mod profile;
 pub mod quantity;
 pub mod residual;
 pub mod savgol;
+pub mod series;
 pub mod table;

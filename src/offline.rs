@@ -16,6 +16,7 @@ pub mod output;
 pub mod picker;
 pub mod picture;
 pub mod progress;
+pub mod recorded;
 pub mod replay;
 pub mod report;
 pub mod reproduce;

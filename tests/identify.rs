@@ -256,3 +256,161 @@ fn arguments_that_are_wrong() {
         assert!(said.contains(expected), "{more:?}: {said}");
     }
 }
+
+/// A cell of this repository with its profile, some lines changed, and the
+/// recording of its simulated run.
+fn recorded(folder: &Path, change: impl FnOnce(String) -> String) -> PathBuf {
+    let cells = Path::new(env!("CARGO_MANIFEST_DIR")).join("cells");
+    let text = fs::read_to_string(cells.join("extruder-excite.toml")).unwrap();
+    fs::write(folder.join("cell.toml"), change(text)).unwrap();
+    fs::copy(cells.join("excite.csv"), folder.join("excite.csv")).unwrap();
+    let out = folder.join("run");
+    let run = ["simulate", "--record", "--seed", "7", "--out", out.to_str().unwrap()];
+    truebead(&run).arg(folder.join("cell.toml")).assert().code(0);
+    out.join("recording.mcap")
+}
+
+/// The number behind a name in the table of parameters, and its error.
+fn parameter(answer: &str, name: &str) -> (f64, f64) {
+    let line = answer.lines().find(|line| line.trim_start().starts_with(name)).unwrap();
+    let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    (numbers[0], numbers[1])
+}
+
+#[test]
+fn from_a_simulated_run_to_a_cell_with_the_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = recorded(folder.path(), |text| text);
+    let recording = recording.to_str().unwrap();
+    let list = said(&mut truebead(&["identify", recording]), 0);
+    for part in ["command_rpm ", "50.00 Hz", "width_mm ", "laid_flow_mm3_per_s ", "mm³/s"] {
+        assert!(list.contains(part), "{part} in {list}");
+    }
+    let out = folder.path().join("model");
+    let columns = ["--input", "command_rpm", "--output", "laid_flow_mm3_per_s", "--from-s", "4"];
+    let mut command = truebead(&["identify", recording, "--model", "sopdt"]);
+    let answer = said(command.args(columns).arg("--out").arg(&out), 0);
+    // The cell's plant: 18 / (0.656 s² + 0.975 s + 1), 0.25 s of dead time.
+    for (name, truth) in
+        [("gain", 18.0), ("period_s", 0.656_f64.sqrt()), ("damping", 0.602), ("dead_time_s", 0.25)]
+    {
+        let (found, sigma) = parameter(&answer, name);
+        let off = (found - truth).abs();
+        assert!(off < 3.0 * sigma && sigma < 0.12 * truth, "{name}: {found} ± {sigma}");
+    }
+    assert!(answer.contains("held from sample to sample"), "{answer}");
+    assert!(answer.contains("samples that say as much as"), "{answer}");
+    // A cell that commands by that model.
+    let cells = Path::new(env!("CARGO_MANIFEST_DIR")).join("cells");
+    let text = fs::read_to_string(cells.join("extruder-feedforward.toml")).unwrap();
+    let with_model = |line: &str| {
+        !["material", "nozzle_mm", "temperature_c"].iter().any(|key| line.starts_with(key))
+    };
+    let text: Vec<&str> = text.lines().filter(|line| with_model(line)).collect();
+    let library = "library = \"../models\"           # or model = \"../models/example.toml\"";
+    let text = text.join("\n").replace(library, "model = \"model/model.toml\"");
+    let cell = folder.path().join("feedforward.toml");
+    fs::write(&cell, text).unwrap();
+    let run = folder.path().join("by-model");
+    truebead(&["simulate"]).arg(&cell).arg("--out").arg(&run).assert().code(0);
+}
+
+#[test]
+fn what_a_recording_cannot_be_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let shorter = |text: String| text.replace("path_mm = 6500.0", "path_mm = 1500.0");
+    let recording = recorded(folder.path(), shorter);
+    let recording = recording.to_str().unwrap();
+    let ask = |args: &str, code| {
+        let mut command = truebead(&["identify", recording]);
+        said(command.args(args.split(' ')).arg("--out").arg(folder.path().join("m")), code)
+    };
+    let told = ask("--input command_v --output width_mm", 2);
+    assert!(told.contains("no column command_v; the columns are command_rpm,"), "{told}");
+    let told = ask("--input command_rpm", 2);
+    assert!(told.contains("needs both --input and --output"), "{told}");
+    let told = ask("--input command_rpm --width width_mm --speed a --layer-height-mm 1", 2);
+    assert!(told.contains("--width is for tables") && told.contains("laid_flow"), "{told}");
+    let told = ask("--input command_rpm --output width_mm --from-s 9.9", 1);
+    assert!(told.contains("a model takes 50 or more"), "{told}");
+    // A recording is not written over.
+    let mut again = truebead(&["simulate", "--record"]);
+    again.arg(folder.path().join("cell.toml")).arg("--out").arg(folder.path().join("run"));
+    assert!(said(&mut again, 1).contains("is not overwritten"));
+}
+
+/// A log of a bead that is measured 40 mm behind the nozzle while the speed
+/// changes, from the log of an extruder.
+fn bead_log(folder: &Path) -> PathBuf {
+    let log = logged::binary().unwrap();
+    let speed = |t: f64| 60.0 + 25.0 * (0.9 * t).sin();
+    let way = |t: f64| 60.0 * t + 25.0 / 0.9 * (1.0 - (0.9 * t).cos());
+    let area = |k: usize| log.flow_mm3_per_s[k] / speed(log.time_s[k]);
+    let mut text = "time_s,screw_rpm,way_mm,wheel_mm_per_s,area_mm2,width_mm\n".to_owned();
+    let mut laid = 0;
+    for (k, t) in log.time_s.iter().enumerate() {
+        while way(log.time_s[laid + 1]) + 40.0 <= way(*t) {
+            laid += 1;
+        }
+        let (from, to) = (way(log.time_s[laid]) + 40.0, way(log.time_s[laid + 1]) + 40.0);
+        let share = ((way(*t) - from) / (to - from)).max(0.0);
+        let area = area(laid) + (area(laid + 1) - area(laid)) * share;
+        let width = (area - std::f64::consts::FRAC_PI_4 * 4.0) / 2.0 + 2.0;
+        text += &format!(
+            "{t:.2},{},{:.5},{:.5},{area:.5},{width:.5}\n",
+            log.screw_rpm[k],
+            way(*t),
+            speed(*t)
+        );
+    }
+    let path = folder.join("bead.csv");
+    fs::write(&path, text).unwrap();
+    path
+}
+
+#[test]
+fn a_flow_that_was_measured_on_the_bead_is_the_flow_at_the_nozzle() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = bead_log(folder.path());
+    let ask = |args: &str, code| {
+        let mut command = truebead(&["identify"]);
+        command.arg(&log).args(args.split(' ')).args(["--model", "sopdt", "--input", "screw_rpm"]);
+        said(command.arg("--out").arg(folder.path().join("m")), code)
+    };
+    let aligned = "--speed wheel_mm_per_s --position way_mm --measured-at-offset-mm 40";
+    for of in ["--area area_mm2", "--width width_mm --layer-height-mm 2"] {
+        let answer = ask(&format!("{of} {aligned}"), 0);
+        assert!(answer.contains("their bead has not been measured"), "{answer}");
+        for (name, truth) in
+            [("gain", 19.05), ("period_s", 0.81), ("damping", 0.6), ("dead_time_s", 0.25)]
+        {
+            let (found, sigma) = parameter(&answer, name);
+            assert!((found - truth).abs() < 4.0 * sigma, "{of}: {name} {found} ± {sigma}");
+        }
+    }
+    // Without the way the bead seems to answer 40 mm later, at a speed that changes.
+    let answer = ask("--area area_mm2 --speed wheel_mm_per_s --validate-share 0", 0);
+    assert!(parameter(&answer, "dead_time_s").0 > 0.6, "{answer}");
+    for (args, code, expected) in [
+        ("--area area_mm2", 2, "--speed"),
+        ("--area area_mm2 --speed way_mm", 2, "way_mm is in mm, expected mm/s"),
+        ("--area area_mm2 --speed wheel_mm_per_s --measured-at-offset-mm 4", 2, "needs --position"),
+        ("--output area_mm2 --position way_mm", 2, "--measured-at-offset-mm"),
+        ("--output area_mm2 --position way_mm --measured-at-offset-mm -1", 2, "expected 0 to 1e5"),
+        ("--output area_mm2 --position time_s --measured-at-offset-mm 1", 2, "time_s"),
+        ("--output width_mm --position way_mm --measured-at-offset-mm 90000", 1, "goes on by"),
+        ("--width width_mm --speed wheel_mm_per_s", 2, "--layer-height-mm"),
+        (
+            "--width width_mm --speed wheel_mm_per_s --layer-height-mm 9",
+            1,
+            "bead.csv, line 2, column width_mm",
+        ),
+        ("--area thick_mm2 --speed wheel_mm_per_s", 2, "there is no column thick_mm2"),
+    ] {
+        let told = ask(args, code);
+        assert!(told.contains(expected), "{args}: {told}");
+    }
+    let list = said(truebead(&["identify"]).arg(&log), 0);
+    assert!(list.contains("area_mm2 ") && list.contains("50.00 Hz"), "{list}");
+    assert!(!list.contains("time_s"), "{list}");
+}

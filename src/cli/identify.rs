@@ -1,14 +1,18 @@
 //! `truebead identify`: a model of an extruder from logged data.
 
+mod bead;
 mod data;
 mod example;
+mod list;
 mod options;
+mod source;
 
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::Args;
 
+use self::bead::{Bead, LAID_FLOW};
 use self::options::{Columns, parse_dead_time, parse_forms, parse_hampel, parse_smooth};
 use super::WrongArguments;
 use super::outcome::free_folder;
@@ -36,9 +40,18 @@ Examples:
   truebead identify example/log.csv --input screw_rpm --output flow_mm3_per_s \\
       --validate example/other.csv --material PLA --nozzle-mm 0.4 --temperature-c 210
 
-The data are a table (CSV) with a line of names. The ends of the names tell the units:
-time_s or time_ms; _rpm, _mpa, _bar, _v, _mm3_per_s, _g_per_min and others (--unit
-names them where the column does not).
+  truebead simulate cells/extruder-excite.toml --record --out excite
+  truebead identify excite/recording.mcap
+  truebead identify excite/recording.mcap --input command_rpm --output laid_flow_mm3_per_s
+  truebead identify log.csv --input screw_rpm --width width_mm --layer-height-mm 1.5 \\
+      --speed wheel_mm_per_s --position way_mm --measured-at-offset-mm 40
+
+The data are a table (CSV) with a line of names, or a recording of run or simulate.
+The ends of the names tell the units: time_s or time_ms; _rpm, _mpa, _bar, _v,
+_mm3_per_s, _g_per_min and others (--unit names them where the column does not).
+Columns of a recording have moments of their own and are brought to those of the
+output. laid_flow_mm3_per_s is the section of the bead times the speed at which it
+was laid, at the moment when it was laid.
 
 Forms: fopdt is K (Tz s + 1) / (T s + 1) e^(-L s) without Tz, fopdt-zero with it;
 sopdt and sopdt-zero have K / (T^2 s^2 + 2 D T s + 1), sopdt-real and
@@ -49,11 +62,13 @@ as well as the best one.
 
 Exit status: 0 a model was found, 1 none that can be trusted, 2 wrong arguments.")]
 pub struct IdentifyArgs {
-    /// Table of logged data
-    #[arg(value_name = "DATA.csv", required_unless_present = "example")]
+    /// Table of logged data, or a recording of a run
+    #[arg(value_name = "DATA.csv|RECORDING.mcap", required_unless_present = "example")]
     data: Option<PathBuf>,
     #[command(flatten)]
     columns: Columns,
+    #[command(flatten)]
+    bead: Bead,
     /// Forms of the model: compare, fopdt, fopdt-zero, sopdt, sopdt-zero, sopdt-real,
     /// sopdt-real-zero, or numbers of poles and zeros such as 2,1; may be repeated
     #[arg(long, value_name = "FORM", value_parser = parse_forms, default_value = "compare")]
@@ -62,7 +77,7 @@ pub struct IdentifyArgs {
     #[arg(long, value_name = "S", value_parser = parse_dead_time, default_value = "estimate")]
     dead_time_s: Wanted,
     /// Data to validate with, of the same columns
-    #[arg(long, value_name = "OTHER.csv", conflicts_with = "validate_share")]
+    #[arg(long, value_name = "OTHER", conflicts_with = "validate_share")]
     validate: Option<PathBuf>,
     /// Share at the end of the data that is kept to validate with; 0 for none
     /// [default: 0.3]
@@ -111,6 +126,9 @@ pub fn run(args: &IdentifyArgs) -> Result<()> {
         return example::write(folder);
     }
     let setting = args.setting()?;
+    if let Some(data) = args.data.as_ref().filter(|_| args.asks_for_columns()) {
+        return list::write(data, &args.columns, &args.bead);
+    }
     let (logs, doubts) = args.logs()?;
     let source = logs.source.clone();
     let forms = args.forms(&logs.estimation);
@@ -156,15 +174,27 @@ impl IdentifyArgs {
         })
     }
 
+    /// The output's name where it is made of other columns.
+    fn made(&self) -> Option<&'static str> {
+        self.bead.makes_flow().then_some(LAID_FLOW)
+    }
+
+    fn asks_for_columns(&self) -> bool {
+        self.columns.input.is_none() && self.columns.output.is_none() && self.made().is_none()
+    }
+
     /// The data, and what is odd about their units.
     fn logs(&self) -> Result<(Logs, Vec<String>)> {
-        let (Some(path), Some(input), Some(output)) =
-            (&self.data, &self.columns.input, &self.columns.output)
+        let output = self.columns.output.as_deref().or(self.made());
+        let (Some(path), Some(input), Some(output)) = (&self.data, &self.columns.input, output)
         else {
-            return Err(WrongArguments::new("needs DATA.csv, --input and --output").into());
+            let what = "needs both --input and --output (or --area or --width with --speed); \
+                        without either it lists the columns";
+            return Err(WrongArguments::new(what).into());
         };
         let filters = data::Filters { hampel: self.hampel, smooth: self.smooth };
-        let read = |path| data::read(path, &self.columns, &filters);
+        let request = data::Request { columns: &self.columns, bead: &self.bead, filters };
+        let read = |path| data::read(path, &request);
         let (log, mut doubts) = read(path)?;
         let source = path.display().to_string();
         let share = self.validate_share.unwrap_or(VALIDATE_SHARE);

@@ -10,12 +10,13 @@ use clap::Args;
 
 use super::cell::LoadedCell;
 use super::{Voice, WITH_LOSS, outcome};
-use crate::config::cell::Purpose;
+use crate::config::cell::{KeepFrames, Purpose};
 use crate::control::{Event, Step};
+use crate::io::record::{self, RecordConfig, RecorderHandle};
 use crate::offline::{
     ControlColumns, ControlFacts, FrameRow, LogError, LogOptions, Note, Progress, RunLog,
 };
-use crate::runner::NoRecorder;
+use crate::ports::{RecordError, Recorder};
 use crate::sim::cell::{LayerEnd, Sight, SimCell, Witness};
 use crate::time::Stamp;
 use crate::units::{Mm, Mm3PerS};
@@ -30,7 +31,8 @@ The scenario is a cell file; [bead], [render] and [simulation] say what is
 simulated. One bead of [simulation] path_mm is laid. level = \"frames\" renders
 and measures every frame; level = \"widths\" takes the true width with noise and
 is thousands of times faster than the clock. Leaves widths.csv, summary.json
-and report.html.")]
+and report.html; with --record also recording.mcap, which identify and viewers of
+MCAP read.")]
 pub struct SimulateArgs {
     /// Cell file that describes cell, bead and world
     scenario: PathBuf,
@@ -40,6 +42,9 @@ pub struct SimulateArgs {
     /// Seed in place of the scenario's
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Leave recording.mcap besides: all events and steps, no frames
+    #[arg(long)]
+    record: bool,
 }
 
 /// Runs the command.
@@ -51,7 +56,8 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
     let extruder = loaded.simulated_extruder()?;
     let calibration = loaded.calibration.clone();
-    let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, NoRecorder, extruder)?;
+    let recorder = SimRecorder::of(args, &loaded)?;
+    let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, recorder, extruder)?;
     let log = RunLog::create(LogOptions {
         folder: args.out.clone(),
         title: format!("Simulation of {}", args.scenario.display()),
@@ -75,6 +81,7 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     if let Some(error) = logger.failed {
         return Err(error.into());
     }
+    sim.into_recorder().finish()?;
     let summary = logger.log.finish()?;
     outcome::figures(&summary);
     say!(
@@ -84,6 +91,39 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     );
     say!("report     {}", args.out.join("report.html").display());
     Ok(status(&loaded, &summary, end))
+}
+
+/// Keeps what happened, where that is asked for.
+struct SimRecorder(Option<RecorderHandle>);
+
+impl SimRecorder {
+    fn of(args: &SimulateArgs, loaded: &LoadedCell) -> anyhow::Result<Self> {
+        if !args.record {
+            return Ok(Self(None));
+        }
+        let config = RecordConfig {
+            frames: KeepFrames::None,
+            epoch_ns: 0,
+            cell_name: loaded.path.display().to_string(),
+            cell_text: loaded.text.clone(),
+            calibration_text: loaded.calibration_text.clone(),
+        };
+        let (recorder, _) = record::start(&config, &args.out)?;
+        Ok(Self(Some(recorder.waiting())))
+    }
+
+    fn finish(self) -> anyhow::Result<()> {
+        if let Some(recorder) = self.0 {
+            recorder.finish()?;
+        }
+        Ok(())
+    }
+}
+
+impl Recorder for SimRecorder {
+    fn record(&mut self, now: Stamp, event: &Event, step: &Step) -> Result<(), RecordError> {
+        self.0.as_mut().map_or(Ok(()), |recorder| recorder.record(now, event, step))
+    }
 }
 
 fn status(loaded: &LoadedCell, summary: &crate::offline::Summary, end: LayerEnd) -> ExitCode {

@@ -218,6 +218,12 @@ impl Experiment {
         self.len().saturating_sub(1) as f64 * self.step_s
     }
 
+    /// Moments of its samples \[s\].
+    #[expect(clippy::cast_precision_loss, reason = "counts of samples")]
+    pub fn moments(&self) -> Vec<f64> {
+        (0..self.len()).map(|k| self.start_s + k as f64 * self.step_s).collect()
+    }
+
     /// The beginning to fit to, and this share of it at the end to validate
     /// with. The notes stay with the first. Fails where either is too short, or
     /// the input or the output of either does not move.

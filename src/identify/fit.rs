@@ -28,6 +28,7 @@
 mod compare;
 mod error;
 mod levenberg;
+mod loose;
 mod named;
 mod problem;
 mod quality;
@@ -39,6 +40,7 @@ mod start;
 
 pub use compare::{Comparison, Row, compare};
 pub use error::FitError;
+pub use loose::Loose;
 pub use quality::Quality;
 pub use report::{Fit, Note, Parameter};
 pub use samples::{DataError, Samples};

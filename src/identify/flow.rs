@@ -20,8 +20,13 @@ pub struct Logged<'a> {
 /// whose material has not been measured when it ends.
 pub fn extruded(logged: &Logged<'_>) -> Result<Vec<f64>, AlignError> {
     let areas = to_extruded(logged.position_mm, logged.area_mm2, logged.offset_mm)?;
-    let pairs = logged.speed_mm_per_s.iter().zip(areas);
-    Ok(pairs.map_while(|(speed, area)| Some(speed * area?)).collect())
+    let areas: Vec<f64> = areas.into_iter().map_while(|area| area).collect();
+    Ok(at_moments(logged.speed_mm_per_s, &areas))
+}
+
+/// Flow \[mm³/s\] from speeds \[mm/s\] and areas \[mm²\] of the same moments.
+pub fn at_moments(speed_mm_per_s: &[f64], area_mm2: &[f64]) -> Vec<f64> {
+    speed_mm_per_s.iter().zip(area_mm2).map(|(speed, area)| speed * area).collect()
 }
 
 #[cfg(test)]

@@ -144,6 +144,8 @@ impl Shared {
 /// recording as [`Self::finish`] does, but tells nobody how that went.
 pub struct RecorderHandle {
     next: u64,
+    /// Whether a full queue is waited for.
+    waits: bool,
     answered: Option<Sender<Answered>>,
     tap: FrameTap,
     path: PathBuf,
@@ -196,8 +198,14 @@ fn start_with<S: Sink + 'static>(
     let inputs = Inputs { answered: answered_out, frames: encoded_out };
     let writer = spawn("recorder", move || thread.run(inputs))?;
     let tap = FrameTap { keep: config.frames, jobs, shared };
-    let handle =
-        RecorderHandle { next: 0, answered: Some(answered), tap, path, writer: Some(writer) };
+    let handle = RecorderHandle {
+        next: 0,
+        waits: false,
+        answered: Some(answered),
+        tap,
+        path,
+        writer: Some(writer),
+    };
     Ok((handle, alarms))
 }
 
@@ -221,7 +229,12 @@ impl Recorder for RecorderHandle {
         let Some(answered) = &self.answered else {
             return Err(shared.fail(RecordError("the recording is finished".to_string())));
         };
-        let why = match answered.try_send(item) {
+        let sent = if self.waits {
+            answered.send(item).map_err(|error| TrySendError::Disconnected(error.0))
+        } else {
+            answered.try_send(item)
+        };
+        let why = match sent {
             Ok(()) => {
                 self.next += 1;
                 return Ok(());
@@ -236,6 +249,14 @@ impl Recorder for RecorderHandle {
 }
 
 impl RecorderHandle {
+    /// Waits from now on where the disk does not keep up, in place of ending the
+    /// recording: for a simulation, whose clock can wait.
+    #[must_use]
+    pub fn waiting(mut self) -> Self {
+        self.waits = true;
+        self
+    }
+
     /// As [`FrameTap::frame`].
     pub fn frame(&self, frame: Arc<Frame>) {
         self.tap.frame(frame);

@@ -155,17 +155,14 @@ fn samples(data: &Experiment) -> Result<Samples, DataError> {
 fn refused(row: &Row) -> (String, String) {
     let why = match &row.fit {
         Err(error) => error.to_string(),
-        Ok(fit) => fit.notes.iter().find_map(|note| undetermined(fit, note)).unwrap_or_default(),
+        Ok(fit) => fit.notes.iter().find_map(undetermined).unwrap_or_default(),
     };
     (form(row.settings.structure), why)
 }
 
-fn undetermined(fit: &Fit, note: &Note) -> Option<String> {
-    let Note::Undetermined(name) = note else { return None };
-    let found = fit.parameter(name)?;
-    let error =
-        FitError::Undetermined { parameter: name.clone(), value: found.value, sigma: found.sigma };
-    Some(error.to_string())
+fn undetermined(note: &Note) -> Option<String> {
+    let Note::Undetermined(loose) = note else { return None };
+    Some(FitError::Undetermined(loose.clone()).to_string())
 }
 
 impl Study {
@@ -207,10 +204,12 @@ impl Study {
         let outside = self.residuals.share_outside();
         if outside > 0.05 {
             doubts.push(format!(
-                "what the model leaves hangs together ({:.0} % of the lags outside the 99 % band): \
-                 the noise is coloured, or something is missing in the model; the standard errors \
-                 allow for it",
-                100.0 * outside
+                "what the model leaves hangs together ({:.0} % of the lags outside the 99 % band; the \
+                 {} samples say as much as {:.0} independent ones): the noise is coloured, or \
+                 something is missing in the model; the standard errors allow for it",
+                100.0 * outside,
+                self.fit.residuals.len(),
+                self.fit.independent_samples
             ));
         }
         doubts
@@ -285,7 +284,7 @@ fn of_note(note: &Note) -> String {
             "the dead time of {dead_time_s:.4} s is told to a whole step only: the form passes its \
              input straight through"
         ),
-        Note::Undetermined(name) => format!("the data do not determine {name}"),
+        Note::Undetermined(loose) => loose.to_string(),
     }
 }
 

@@ -8,15 +8,17 @@ use crate::identify::fit::{DeadTime, MOST_POLES, Structure};
 use crate::identify::hampel::Hampel;
 use crate::identify::quantity::{Quantity, Unit};
 use crate::identify::savgol::SavGol;
+use crate::identify::series::Series;
 
 /// Which columns are meant, and what they hold.
 #[derive(Debug, Args)]
 pub struct Columns {
-    /// Column of what goes in, such as the speed of the screw
-    #[arg(long, value_name = "COLUMN", required_unless_present = "example")]
+    /// Column of what goes in, such as the speed of the screw; without input and output
+    /// the columns are listed
+    #[arg(long, value_name = "COLUMN")]
     pub input: Option<String>,
     /// Column of what comes out, such as the flow
-    #[arg(long, value_name = "COLUMN", required_unless_present = "example")]
+    #[arg(long, value_name = "COLUMN")]
     pub output: Option<String>,
     /// Column of time
     /// [default: the one whose name begins with time]
@@ -30,6 +32,12 @@ pub struct Columns {
     /// [default: five steps]
     #[arg(long, value_name = "S")]
     pub max_gap_s: Option<f64>,
+    /// Leave out what was logged before this moment [s]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub from_s: Option<f64>,
+    /// Leave out what was logged after this moment [s]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub to_s: Option<f64>,
 }
 
 /// A column's unit that was told.
@@ -90,6 +98,30 @@ impl Columns {
     /// The unit of a column as it was told.
     pub fn told(&self, column: &str) -> Option<&str> {
         self.unit.iter().find(|told| told.column == column).map(|told| told.unit.as_str())
+    }
+
+    fn span(&self) -> (f64, f64) {
+        (self.from_s.unwrap_or(f64::NEG_INFINITY), self.to_s.unwrap_or(f64::INFINITY))
+    }
+
+    /// Keeps of columns of a table what was asked for; returns the first row
+    /// that is kept. Rows without a value of the output are left out.
+    pub fn cut(&self, time_s: &mut Vec<f64>, input: &mut Vec<f64>, output: &mut Vec<f64>) -> usize {
+        let (from_s, to_s) = self.span();
+        time_s.truncate(output.len());
+        let first = time_s.iter().position(|time| *time >= from_s).unwrap_or(time_s.len());
+        let end = time_s.iter().rposition(|time| *time <= to_s).map_or(first, |last| last + 1);
+        for column in [time_s, input, output] {
+            column.truncate(end.max(first));
+            column.drain(..first);
+        }
+        first
+    }
+
+    /// Keeps of a column of a recording what was asked for.
+    pub fn cut_series(&self, column: &Series) -> Series {
+        let (from_s, to_s) = self.span();
+        column.within(from_s, to_s)
     }
 
     /// A column that a unit was told of and that is not there.

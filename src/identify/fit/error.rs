@@ -1,5 +1,6 @@
 //! Why there is no fit.
 
+use super::loose::Loose;
 use super::samples::DataError;
 use crate::model::ModelError;
 
@@ -85,18 +86,8 @@ pub enum FitError {
         damping: f64,
     },
     /// More parameters than the data can tell apart.
-    #[error(
-        "the data do not determine {parameter}: {value:.4} with a standard error of {sigma:.2e}; \
-         take fewer poles or zeros, or excite the input more"
-    )]
-    Undetermined {
-        /// Its name.
-        parameter: String,
-        /// What came out.
-        value: f64,
-        /// Its standard error; infinite where nothing holds it.
-        sigma: f64,
-    },
+    #[error("{0}; take fewer poles or zeros, or excite the input more")]
+    Undetermined(Loose),
     /// Nothing that could be started from.
     #[error(
         "no model of this form could be started: the output does not follow the input with any \

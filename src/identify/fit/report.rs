@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 
 use super::error::FitError;
 use super::levenberg::{Outcome, nearest};
+use super::loose::{Loose, loose};
 use super::named::Named;
 use super::problem::{Problem, dot, free_responses, spread as spread_of};
 use super::quality::Quality;
@@ -40,9 +41,9 @@ pub enum Note {
         /// That whole number of steps \[s\].
         dead_time_s: f64,
     },
-    /// The data do not determine this parameter
+    /// The data do not determine all parameters
     /// ([`Settings::accept_undetermined`]).
-    Undetermined(String),
+    Undetermined(Loose),
     /// The oscillating form came out with a damping above 1: its poles are real.
     PolesAreReal,
 }
@@ -155,13 +156,11 @@ pub(super) fn report(
         return Ok(fit);
     }
     let loose = fit.notes.iter().find_map(|note| match note {
-        Note::Undetermined(name) => fit.parameter(name),
+        Note::Undetermined(loose) => Some(loose.clone()),
         _ => None,
     });
     match loose {
-        Some(Parameter { name, value, sigma, .. }) => {
-            Err(FitError::Undetermined { parameter: name.clone(), value: *value, sigma: *sigma })
-        }
+        Some(loose) => Err(FitError::Undetermined(loose)),
         None => Ok(fit),
     }
 }
@@ -263,11 +262,6 @@ fn count(n: usize) -> f64 {
     n as f64
 }
 
-/// By how many standard errors a coefficient must differ from zero.
-const SEEN_SIGMAS: f64 = 2.0;
-
-/// The highest coefficient of the denominator is determined where it differs from
-/// zero: otherwise the data show a pole fewer.
 fn notes(
     problem: &Problem,
     theta: &[f64],
@@ -275,16 +269,8 @@ fn notes(
     named: &Named,
     turn: &DMatrix<f64>,
 ) -> Vec<Note> {
-    let mut notes = Vec::new();
-    let last = problem.layout().poles_from + problem.poles - 1;
-    let sigma = spread.coloured[(last, last)].max(0.0).sqrt();
-    let unseen = sigma.is_nan() || SEEN_SIGMAS * sigma >= theta[last].abs();
-    if let Some(loose) = spread.loose.or(unseen.then_some(last)) {
-        // The reported parameter that hangs most on it.
-        let part = |i: usize| (turn[(i, loose)] / named.values[i]).abs();
-        let most = (0..named.names.len()).max_by(|a, b| part(*a).total_cmp(&part(*b)));
-        notes.extend(most.map(|i| Note::Undetermined(named.names[i].clone())));
-    }
+    let mut notes: Vec<Note> =
+        loose(problem, theta, spread, named, turn).map(Note::Undetermined).into_iter().collect();
     if named.poles_are_real {
         notes.push(Note::PolesAreReal);
     }

@@ -82,9 +82,9 @@ pub(super) struct Spread {
     pub white: DMatrix<f64>,
     /// For residuals of their colour.
     pub coloured: DMatrix<f64>,
-    /// The parameter that moves most along the direction in which the data hold
-    /// least, where they hold next to nothing.
-    pub loose: Option<usize>,
+    /// How the parameters move along the direction in which the data hold least,
+    /// where they hold next to nothing.
+    pub loose: Option<Vec<f64>>,
 }
 
 /// Least eigenvalue of the normalized equations that still tells something.
@@ -97,11 +97,19 @@ pub(super) fn spread(columns: &[Vec<f64>], colour: &Colour, samples: usize) -> S
     let normal = normal_matrix(columns, &sizes);
     let eigen = normal.clone().symmetric_eigen();
     let least = eigen.eigenvalues.imin();
-    let loose =
-        (eigen.eigenvalues[least] < SINGULAR).then(|| eigen.eigenvectors.column(least).iamax());
+    let is_loose = eigen.eigenvalues[least] < SINGULAR;
+    let along = || {
+        let direction = eigen.eigenvectors.column(least);
+        direction.iter().zip(&sizes).map(|(part, size)| part / size).collect()
+    };
+    let loose: Option<Vec<f64>> = is_loose.then(along);
     let endless = || DMatrix::from_diagonal_element(p, p, f64::INFINITY);
     let Some(inverse) = normal.try_inverse() else {
-        return Spread { white: endless(), coloured: endless(), loose: loose.or(Some(0)) };
+        return Spread {
+            white: endless(),
+            coloured: endless(),
+            loose: loose.or_else(|| Some(along())),
+        };
     };
     #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
     let freedom = samples as f64 / (samples.saturating_sub(p).max(1)) as f64;

@@ -40,6 +40,7 @@ pub fn to_json(study: &Study) -> Value {
         "validated": study.validation.map(quality),
         "residuals": {
             "sigma": fit.residual_sigma,
+            "independent_samples": fit.independent_samples,
             "share_of_lags_outside_99_percent": study.residuals.share_outside(),
         },
         "compared": study.comparison.rows.iter().map(row).collect::<Vec<Value>>(),

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::table::{significant, transfer};
+use super::table::{independent, significant, transfer};
 use super::{Study, curves, form};
 use crate::offline::report::palette::MODEL;
 use crate::offline::report::sections::legend;
@@ -142,6 +142,7 @@ fn left(study: &Study) -> Markup {
     html! {
         section {
             h2 { "What it leaves" }
+            p.hint { (independent(&study.fit)) }
             (curves::residuals(study))
             (curves::autocorrelation(study))
         }

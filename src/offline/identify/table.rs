@@ -157,6 +157,7 @@ fn quality(text: &mut String, study: &Study) {
         significant(own.mae)
     );
     put(text, "fit", &line);
+    put(text, "residuals", &independent(&study.fit));
     if let Some(other) = study.validation {
         let line = format!(
             "{:.2} % NRMSE, RMSE {} {unit}, MAE {} {unit}",
@@ -166,4 +167,13 @@ fn quality(text: &mut String, study: &Study) {
         );
         put(text, "validated", &line);
     }
+}
+
+/// How many samples the colour of the residuals leaves.
+pub fn independent(fit: &Fit) -> String {
+    format!(
+        "{} samples that say as much as {:.0} independent ones",
+        fit.residuals.len(),
+        fit.independent_samples
+    )
 }

@@ -60,6 +60,11 @@ fn a_signal_cut_off_is_told_from_a_command_that_steps() {
     assert!(matches!(clipped, Err(DataError::Clipped { what: "input", .. })));
     let steps: Vec<f64> = (0..600_u32).map(|k| f64::from((k / 20 * 7) % 2)).collect();
     assert_eq!(Samples::new(steps, sine(600), 0.1).unwrap().check_clipped(), Ok(()));
+    // Levels of a drive that takes its steps over some samples.
+    let level = |k: u32| 5.0 * f64::from((k / 14 * 5) % 3 % 2);
+    let ramps: Vec<f64> =
+        (0..600_u32).map(|k| (level(k) + level(k + 1) + level(k + 2)) / 3.0).collect();
+    assert_eq!(Samples::new(ramps, sine(600), 0.1).unwrap().check_clipped(), Ok(()));
     // Dead time before, rest after.
     let mut answer = vec![0.0; 60];
     answer.extend((0..240).map(|k| 1.0 - libm::exp(-0.05 * f64::from(k))));

@@ -94,12 +94,29 @@ fn too_many_poles_are_told_by_name() {
     for seed in 0..4 {
         let samples = driven(&flow(), 0.1, seed);
         let error = fit(&samples, &settings).unwrap_err();
-        assert!(matches!(error, FitError::Undetermined { .. }), "{error}");
+        assert!(matches!(error, FitError::Undetermined(Loose::Pole { poles: 3, .. })), "{error}");
+        assert!(error.to_string().contains("do not tell 3 poles from 2"), "{error}");
         let accepted = Settings { accept_undetermined: true, ..settings };
         let found = fit(&samples, &accepted).unwrap();
         assert!(!found.is_determined());
         assert!(found.quality.fit_percent > 80.0, "{:?}", found.quality);
     }
+}
+
+#[test]
+fn a_pole_that_a_zero_cancels_is_told_as_such() {
+    // Over its own highest coefficient each parameter may look well determined.
+    let settings = from_rest(Structure::Transfer { poles: 3, zeros: 2 }, DeadTime::Given(0.0));
+    let mut pairs = 0;
+    for seed in 0..4 {
+        let error = fit(&driven(&flow(), 0.1, seed), &settings).unwrap_err();
+        let FitError::Undetermined(Loose::Pole { poles, coefficient, sigma, pair }) = error else {
+            panic!("{error}");
+        };
+        assert!(poles == 3 && coefficient.abs() <= 2.0 * sigma, "{coefficient} ± {sigma}");
+        pairs += u32::from(pair.is_some_and(|(pole, zero)| (pole - zero).abs() < 0.3 * pole.abs()));
+    }
+    assert!(pairs > 0);
 }
 
 #[test]

@@ -1,0 +1,129 @@
+//! What the data leave open, told so that a reader knows what to leave out.
+
+use std::fmt;
+
+use nalgebra::{Complex, DMatrix};
+
+use super::named::Named;
+use super::problem::Problem;
+use super::spread::Spread;
+use crate::model::polynomial;
+
+/// By how many standard errors a coefficient must differ from zero.
+const SEEN_SIGMAS: f64 = 2.0;
+/// A pole and a zero that are closer than this share of their size all but
+/// cancel.
+const CANCELS: f64 = 0.3;
+/// Parameters that move by this share of the one that moves most belong to a
+/// combination.
+const MOVES: f64 = 0.1;
+
+/// What is not determined.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Loose {
+    /// The highest coefficient of the denominator does not differ from zero, so
+    /// that the data show a pole fewer. Each parameter of a form that is told
+    /// over that coefficient may look well determined beside the others.
+    Pole {
+        /// Poles that were asked for.
+        poles: usize,
+        /// The coefficient of the highest power of s in a denominator that ends
+        /// with 1.
+        coefficient: f64,
+        /// Its standard error; infinite where nothing holds it.
+        sigma: f64,
+        /// A pole and a zero that all but cancel \[1/s\].
+        pair: Option<(f64, f64)>,
+    },
+    /// Parameters of which one makes up for a change of the others.
+    Together {
+        /// Their names.
+        names: Vec<String>,
+        /// A pole and a zero that all but cancel \[1/s\]: the data do not tell
+        /// where.
+        pair: Option<(f64, f64)>,
+    },
+}
+
+impl fmt::Display for Loose {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Pole { poles, coefficient, sigma, pair } => {
+                write!(
+                    f,
+                    "the data do not tell {poles} pole{} from {}: in a denominator that ends with \
+                     1 the coefficient of s^{poles} is {coefficient:.2e} with a standard error of \
+                     {sigma:.2e}, which is no more than chance",
+                    if *poles == 1 { "" } else { "s" },
+                    poles.saturating_sub(1)
+                )?;
+                cancelling(f, *pair)
+            }
+            Self::Together { names, pair } => {
+                match names.split_last() {
+                    Some((last, others)) if !others.is_empty() => write!(
+                        f,
+                        "the data do not determine {} and {last}: a change of one makes up for \
+                         the others",
+                        others.join(", ")
+                    ),
+                    Some((only, _)) => write!(f, "the data do not determine {only}"),
+                    None => f.write_str("the data do not determine the parameters"),
+                }?;
+                cancelling(f, *pair)
+            }
+        }
+    }
+}
+
+fn cancelling(f: &mut fmt::Formatter<'_>, pair: Option<(f64, f64)>) -> fmt::Result {
+    match pair {
+        Some((pole, zero)) => {
+            write!(f, " (a pole at {pole:.3} 1/s and a zero at {zero:.3} 1/s all but cancel)")
+        }
+        None => Ok(()),
+    }
+}
+
+/// What the data leave open; none where they determine everything.
+pub(super) fn loose(
+    problem: &Problem,
+    theta: &[f64],
+    spread: &Spread,
+    named: &Named,
+    turn: &DMatrix<f64>,
+) -> Option<Loose> {
+    let last = problem.layout().poles_from + problem.poles - 1;
+    let sigma = spread.coloured[(last, last)].max(0.0).sqrt();
+    if sigma.is_nan() || SEEN_SIGMAS * sigma >= theta[last].abs() {
+        let (poles, coefficient) = (problem.poles, theta[last]);
+        return Some(Loose::Pole { poles, coefficient, sigma, pair: pair(problem, theta) });
+    }
+    let direction = spread.loose.as_ref()?;
+    let names = together(direction, named, turn);
+    Some(Loose::Together { names, pair: pair(problem, theta) })
+}
+
+/// The reported parameters that move along the direction which nothing holds.
+fn together(direction: &[f64], named: &Named, turn: &DMatrix<f64>) -> Vec<String> {
+    let moves = |i: usize| {
+        let sum: f64 = direction.iter().enumerate().map(|(j, by)| turn[(i, j)] * by).sum();
+        (sum / named.values[i]).abs()
+    };
+    let moved: Vec<f64> = (0..named.names.len()).map(moves).collect();
+    let most = moved.iter().copied().filter(|by| by.is_finite()).fold(0.0, f64::max);
+    let names = named.names.iter().zip(&moved);
+    names.filter(|(_, by)| **by >= MOVES * most).map(|(name, _)| name.clone()).collect()
+}
+
+/// The pole and the zero that are closest to each other, if they all but cancel.
+fn pair(problem: &Problem, theta: &[f64]) -> Option<(f64, f64)> {
+    let model = problem.transfer(theta)?;
+    let apart = |pole: &Complex<f64>, zero: &Complex<f64>| (pole - zero).norm() / pole.norm();
+    let zeros = polynomial::roots(model.num());
+    let pairs = polynomial::roots(model.den()).into_iter();
+    let pairs = pairs.flat_map(|pole| zeros.iter().map(move |zero| (pole, *zero)));
+    let nearest = pairs.min_by(|a, b| apart(&a.0, &a.1).total_cmp(&apart(&b.0, &b.1)))?;
+    let near = apart(&nearest.0, &nearest.1) < CANCELS;
+    near.then_some((nearest.0.re, nearest.1.re))
+}
