@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
+use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -356,12 +357,8 @@ fn bead_log(folder: &Path) -> PathBuf {
         let share = ((way(*t) - from) / (to - from)).max(0.0);
         let area = area(laid) + (area(laid + 1) - area(laid)) * share;
         let width = (area - std::f64::consts::FRAC_PI_4 * 4.0) / 2.0 + 2.0;
-        text += &format!(
-            "{t:.2},{},{:.5},{:.5},{area:.5},{width:.5}\n",
-            log.screw_rpm[k],
-            way(*t),
-            speed(*t)
-        );
+        let (rpm, way, speed) = (log.screw_rpm[k], way(*t), speed(*t));
+        writeln!(text, "{t:.2},{rpm},{way:.5},{speed:.5},{area:.5},{width:.5}").unwrap();
     }
     let path = folder.join("bead.csv");
     fs::write(&path, text).unwrap();
