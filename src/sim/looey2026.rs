@@ -77,7 +77,7 @@ impl Method {
     }
 }
 
-/// Inputs that hold [`TARGETS`].
+/// Inputs that hold `TARGETS`.
 pub fn operating_point() -> Inputs {
     let (nozzle, strand) = (MODEL.nozzle, MODEL.strand);
     let (v, u) = (TARGETS.nozzle_m_per_s, TARGETS.strand_m_per_s);

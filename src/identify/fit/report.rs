@@ -17,7 +17,7 @@ use crate::model::{Simulator, TransferFunction, polynomial};
 /// A parameter that was estimated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
-    /// Its name, as [`Structure`] gives it; further `dead_time_s`,
+    /// Its name, as [`super::Structure`] gives it; further `dead_time_s`,
     /// `output_level`.
     pub name: String,
     /// Estimate, in seconds where the name ends so, else in units of the data and
