@@ -1,32 +1,17 @@
-//! The PC's side of the robot link, over TCP.
-//!
-//! A thread owns the connection and reads; it connects, says `HELLO`, and
-//! reports what the robot says. Setpoints are written by the caller's own
-//! thread ([`LinkClient::send`]), so that no queue stands between a decision
-//! and the socket.
+//! The PC's side of the robot link: what may be sent to a robot, over a
+//! connection that is kept up ([`Client`]).
 
-use std::sync::Arc;
-use std::thread::JoinHandle;
-use std::time::Duration;
-
-use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
+use crossbeam_channel::Sender;
 
 use crate::control::{Command, Event, RobotLimits, RobotMode, RobotState};
 use crate::io::clock::RunClock;
-use crate::link::{ErrCode, MAX_VALID_MS, MIN_VALID_MS};
+use crate::io::link::{Client, Dialect, Heard, LinkEvent, Open, Unsent};
+use crate::link::{LineError, MAX_VALID_MS, MIN_VALID_MS, PcLine, RobotLine, on_wire};
 use crate::ports::RobotPort;
 use crate::time::Stamp;
 use crate::units::MmPerS;
 
-mod connection;
-mod incoming;
-mod outgoing;
-
-use outgoing::Outgoing;
-
-/// Longest wait for the connection's thread when closing. Only a name server
-/// or a host that does not answer takes that long.
-const LONGEST_JOIN: Duration = Duration::from_secs(2);
+pub use crate::io::link::{LinkTiming, Written};
 
 /// How to reach a robot, and what may be sent to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,36 +27,6 @@ pub struct LinkConfig {
     pub valid_ms: u64,
     /// Timeouts and delays.
     pub timing: LinkTiming,
-}
-
-/// Timeouts and delays of the link.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LinkTiming {
-    /// Until a connection must stand.
-    pub connect: Duration,
-    /// Until the robot must have answered `HELLO`.
-    pub hello: Duration,
-    /// Without a `STATE` for this long the connection is given up.
-    pub silence: Duration,
-    /// Longest time for which a write may block.
-    pub write: Duration,
-    /// Delay before the first attempt to connect again; doubles.
-    pub first_delay: Duration,
-    /// Where the delay stops doubling.
-    pub longest_delay: Duration,
-}
-
-impl Default for LinkTiming {
-    fn default() -> Self {
-        Self {
-            connect: Duration::from_secs(1),
-            hello: Duration::from_millis(500),
-            silence: Duration::from_millis(500),
-            write: Duration::from_millis(5),
-            first_delay: Duration::from_millis(100),
-            longest_delay: Duration::from_secs(2),
-        }
-    }
 }
 
 /// A configuration with which no setpoint could ever be right.
@@ -99,49 +54,32 @@ pub enum LinkConfigError {
     },
 }
 
-/// What the link reports, with the time of arrival.
-#[derive(Debug, Clone, PartialEq)]
-pub enum RobotEvent {
-    /// The robot answered `HELLO`.
-    Up {
-        /// When.
-        at: Stamp,
-        /// What it says of itself.
-        robot: RobotLimits,
-    },
-    /// The robot reported its state.
-    State {
-        /// When it arrived.
-        at: Stamp,
-        /// The state.
-        state: RobotState,
-    },
-    /// The robot refused a line.
-    Refused {
-        /// When the refusal arrived.
-        at: Stamp,
-        /// Number of the refused line; 0 where it had none.
-        seq: u64,
-        /// Why.
-        code: ErrCode,
-        /// Why, for the operator.
-        text: String,
-    },
-    /// The connection was lost, or could not be made. Told again only when the
-    /// reason changes.
-    Down {
-        /// When.
-        at: Stamp,
-        /// Why, in words for the operator.
-        reason: String,
-    },
+/// A robot at the other end.
+#[derive(Debug, Clone, Copy)]
+pub struct Robot;
+
+impl Dialect for Robot {
+    type Hello = RobotLimits;
+    type State = RobotState;
+    const NAME: &'static str = "robot";
+
+    fn understand(text: &str) -> Result<Heard<RobotLimits, RobotState>, LineError> {
+        Ok(match RobotLine::parse(text)? {
+            RobotLine::Hello(robot) => Heard::Hello(robot),
+            RobotLine::State(state) => Heard::State(state),
+            RobotLine::Err { seq, code, text } => Heard::Err { seq, code, text },
+        })
+    }
 }
+
+/// What the link to a robot reports, with the time of arrival.
+pub type RobotEvent = LinkEvent<RobotLimits, RobotState>;
 
 impl RobotEvent {
     /// When it happened, and what the controller is to be told.
     pub fn into_event(self) -> (Stamp, Event) {
         match self {
-            Self::Up { at, robot } => (at, Event::LinkUp { robot }),
+            Self::Up { at, hello: robot } => (at, Event::LinkUp { robot }),
             Self::State { at, state } => (at, Event::Robot(state)),
             Self::Refused { at, seq, code, .. } => {
                 (at, Event::Refused { seq, code: code.word().to_owned() })
@@ -149,15 +87,6 @@ impl RobotEvent {
             Self::Down { at, reason } => (at, Event::LinkDown { reason }),
         }
     }
-}
-
-/// A line that has left the PC.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Written {
-    /// Its number on this connection.
-    pub seq: u64,
-    /// Just after its bytes were written.
-    pub at: Stamp,
 }
 
 /// Why a line has not left the PC.
@@ -193,23 +122,23 @@ pub enum NotSent {
     },
 }
 
+impl From<Unsent> for NotSent {
+    fn from(unsent: Unsent) -> Self {
+        match unsent {
+            Unsent::NotConnected => Self::NotConnected,
+            Unsent::Write { reason } => Self::Write { reason },
+        }
+    }
+}
+
 /// What became of a command.
 pub type Sent = Result<Written, NotSent>;
 
 /// A robot at the other end of a TCP connection that is kept up.
 #[derive(Debug)]
 pub struct LinkClient {
-    outgoing: Arc<Outgoing>,
-    thread: Option<Running>,
-}
-
-#[derive(Debug)]
-struct Running {
-    handle: JoinHandle<()>,
-    /// Dropped to end the wait between two connections.
-    quit: Sender<()>,
-    /// Closed by the thread when it ends.
-    ended: Receiver<()>,
+    config: LinkConfig,
+    client: Client<Robot>,
 }
 
 impl LinkClient {
@@ -226,17 +155,9 @@ impl LinkClient {
         if config.min > config.max {
             return Err(LinkConfigError::Limits { min: config.min, max: config.max });
         }
-        let outgoing = Arc::new(Outgoing::new(config, clock));
-        let (quit, quitting) = bounded(0);
-        let (ending, ended) = bounded::<()>(0);
-        let shared = Arc::clone(&outgoing);
-        let body = move || {
-            connection::keep_up(&shared, &events, &quitting);
-            drop(ending);
-        };
-        let thread = std::thread::Builder::new().name("robot-link".to_owned()).spawn(body);
-        let handle = thread.map_err(|e| LinkConfigError::Thread { reason: e.to_string() })?;
-        Ok(Self { outgoing, thread: Some(Running { handle, quit, ended }) })
+        let client = Client::start(config.address.clone(), config.timing, clock, events)
+            .map_err(|error| LinkConfigError::Thread { reason: error.to_string() })?;
+        Ok(Self { config, client })
     }
 
     /// Writes a command. Speeds leave only while the newest `STATE` says
@@ -244,35 +165,40 @@ impl LinkClient {
     /// robot; a stop leaves in any mode. Blocks for [`LinkTiming::write`] at
     /// most; a write that takes longer closes the connection.
     pub fn send(&self, command: Command) -> Sent {
-        self.outgoing.send(command)
+        self.client.send(|open| {
+            let line = match command {
+                Command::Stop => PcLine::Stop { seq: open.next_seq },
+                Command::Speed(speed) => self.config.setpoint(open, speed)?,
+            };
+            Ok(line.format())
+        })
     }
 
     /// Whether the robot has answered `HELLO` on the present connection.
     pub fn connected(&self) -> bool {
-        self.outgoing.connected()
+        self.client.connected()
     }
 
     /// Says `BYE` and ends the thread. The last setpoint runs out at the robot.
-    pub fn close(mut self) {
-        self.end();
-    }
-
-    fn end(&mut self) {
-        let Some(Running { handle, quit, ended }) = self.thread.take() else { return };
-        self.outgoing.close();
-        drop(quit);
-        // Nothing is ever sent on it: it either times out or is closed.
-        if ended.recv_timeout(LONGEST_JOIN) == Err(RecvTimeoutError::Timeout) {
-            tracing::warn!("the robot link is still trying to connect; left to itself");
-        } else if handle.join().is_err() {
-            tracing::error!("the thread of the robot link had failed");
-        }
+    pub fn close(self) {
+        self.client.close();
     }
 }
 
-impl Drop for LinkClient {
-    fn drop(&mut self) {
-        self.end();
+impl LinkConfig {
+    fn setpoint(&self, open: &Open<Robot>, speed: MmPerS) -> Result<PcLine, NotSent> {
+        let state = open.newest.ok_or(NotSent::NoState)?;
+        if !matches!(state.mode, RobotMode::Print | RobotMode::Hold) {
+            return Err(NotSent::NotPrinting { mode: state.mode });
+        }
+        let speed = on_wire(speed);
+        let min = self.min.max(open.hello.min_mm_per_s);
+        let max = self.max.min(open.hello.max_mm_per_s);
+        if speed < min || speed > max {
+            return Err(NotSent::OutsideLimits { speed, min, max });
+        }
+        let (seq, valid_ms) = (open.next_seq, self.valid_ms);
+        Ok(PcLine::Speed { seq, speed, valid_ms, ref_t_ms: state.t_ms })
     }
 }
 

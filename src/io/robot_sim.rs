@@ -2,34 +2,23 @@
 
 use std::collections::VecDeque;
 use std::io;
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::net::{SocketAddr, TcpListener};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread::{Builder, JoinHandle};
-use std::time::Duration;
-
-use crossbeam_channel::{Sender, after, bounded};
 
 use crate::control::{RobotMode, RobotState};
 use crate::io::clock::RunClock;
+use crate::io::server::Server;
 use crate::link::{Faults, Job, ParamError, RobotCell, RobotParams};
 use crate::time::{Span, Stamp};
 use crate::units::Mm;
 
-mod peer;
-mod robot;
+mod machine;
 
-use robot::{Input, Robot};
+pub use crate::io::server::Notice;
+use machine::RobotMachine;
 
 /// Samples of the truth that are kept; at 50 a second more than an hour.
 const LONGEST_HISTORY: usize = 200_000;
-/// Pieces of input that may wait; senders then wait too.
-const WAITING_INPUTS: usize = 64;
-/// How long a call on the robot's own socket may take when it is woken to end.
-const WAKE: Duration = Duration::from_millis(200);
-
-/// What the robot tells the person who watches it.
-pub type Notice = Box<dyn FnMut(Stamp, &str) + Send>;
 
 /// What is simulated.
 #[derive(Debug, Clone)]
@@ -70,16 +59,13 @@ pub enum SimError {
 #[derive(Debug)]
 pub struct RobotSim {
     shared: Arc<Shared>,
-    inputs: Sender<Input>,
-    address: SocketAddr,
-    threads: Vec<JoinHandle<()>>,
+    server: Server,
 }
 
 /// What the robot's thread shares with the handle.
 #[derive(Debug)]
 struct Shared {
     clock: RunClock,
-    quitting: AtomicBool,
     cell: Mutex<RobotCell>,
     history: Mutex<VecDeque<Truth>>,
 }
@@ -116,27 +102,15 @@ impl RobotSim {
             return Err(SimError::Period);
         }
         let cell = RobotCell::new(options.params, clock.now())?;
-        let address = listener.local_addr()?;
-        let (inputs, received) = bounded(WAITING_INPUTS);
-        let shared = Arc::new(Shared {
-            clock,
-            quitting: AtomicBool::new(false),
-            cell: Mutex::new(cell),
-            history: Mutex::default(),
-        });
-        let (job, period) = (options.job, options.state_period);
-        let robot = Robot::new(Arc::clone(&shared), inputs.clone(), job, period, notice);
-        let serve = Builder::new().name("robot-sim".to_owned());
-        let mut threads = vec![serve.spawn(move || robot.run(&received))?];
-        let (accepting, connections) = (Arc::clone(&shared), inputs.clone());
-        let accept = Builder::new().name("robot-sim-accept".to_owned());
-        threads.push(accept.spawn(move || accept_all(&listener, &accepting, &connections))?);
-        Ok(Self { shared, inputs, address, threads })
+        let shared = Arc::new(Shared { clock, cell: Mutex::new(cell), history: Mutex::default() });
+        let machine = RobotMachine::new(Arc::clone(&shared), options.job);
+        let server = Server::spawn(listener, clock, options.state_period, machine, notice)?;
+        Ok(Self { shared, server })
     }
 
     /// Where it listens.
     pub fn local_addr(&self) -> SocketAddr {
-        self.address
+        self.server.local_addr()
     }
 
     /// Its true state now.
@@ -175,59 +149,7 @@ impl RobotSim {
     }
 
     /// Closes all sockets and ends the threads.
-    pub fn stop(mut self) {
-        self.end();
+    pub fn stop(self) {
+        self.server.stop();
     }
-
-    fn end(&mut self) {
-        if self.threads.is_empty() {
-            return;
-        }
-        self.shared.quitting.store(true, Ordering::Release);
-        // Fails only where the thread has ended already.
-        let _ = self.inputs.send(Input::Quit);
-        let _ = TcpStream::connect_timeout(&reachable(self.address), WAKE);
-        for thread in self.threads.drain(..) {
-            if thread.join().is_err() {
-                tracing::error!("a thread of the simulated robot had failed");
-            }
-        }
-    }
-}
-
-impl Drop for RobotSim {
-    fn drop(&mut self) {
-        self.end();
-    }
-}
-
-fn accept_all(listener: &TcpListener, shared: &Shared, inputs: &Sender<Input>) {
-    for connection in listener.incoming() {
-        if shared.quitting.load(Ordering::Acquire) {
-            return;
-        }
-        match connection {
-            Ok(stream) => {
-                if inputs.send(Input::Connection(stream)).is_err() {
-                    return;
-                }
-            }
-            Err(error) => {
-                tracing::warn!(%error, "a connection could not be accepted");
-                // What is short, such as file handles, needs time to return.
-                let _ = after(WAKE).recv();
-            }
-        }
-    }
-}
-
-/// An address that listens everywhere is called on this machine.
-fn reachable(mut address: SocketAddr) -> SocketAddr {
-    if address.ip().is_unspecified() {
-        address.set_ip(match address.ip() {
-            IpAddr::V4(_) => IpAddr::V4(Ipv4Addr::LOCALHOST),
-            IpAddr::V6(_) => IpAddr::V6(Ipv6Addr::LOCALHOST),
-        });
-    }
-    address
 }

@@ -286,7 +286,7 @@ impl Loop<'_> {
                     view.observe(*at, state);
                 }
             }
-            RobotEvent::Up { robot, .. } => {
+            RobotEvent::Up { hello: robot, .. } => {
                 (self.notice)(&format!("robot `{}` is connected", robot.name));
                 self.unfit = unfit(&self.limits, robot);
             }

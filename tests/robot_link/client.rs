@@ -20,7 +20,7 @@ fn hello_then_a_stream_of_setpoints() {
     let sim = sim();
     let mut pc = Pc::start(config(sim.local_addr()));
     let robot = pc.until(|event| match event {
-        RobotEvent::Up { robot, .. } => Some(robot.clone()),
+        RobotEvent::Up { hello: robot, .. } => Some(robot.clone()),
         _ => None,
     });
     assert_eq!((robot.min_mm_per_s, robot.max_mm_per_s), (speed(60.0), speed(150.0)));

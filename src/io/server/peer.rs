@@ -1,4 +1,4 @@
-//! One connection of the simulated robot.
+//! One connection of a server.
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
@@ -7,8 +7,9 @@ use std::time::Duration;
 
 use crossbeam_channel::Sender;
 
-use super::robot::Input;
-use crate::link::{BadLines, LineSplitter, RobotLine};
+use super::Machine;
+use super::host::Input;
+use crate::link::{BadLines, LineSplitter};
 
 /// A PC that takes no bytes for this long is let go.
 const WRITE: Duration = Duration::from_millis(100);
@@ -24,20 +25,24 @@ pub(super) struct Peer {
 
 impl Peer {
     /// Starts to read; bytes and the end arrive among `inputs` under `id`.
-    pub(super) fn new(stream: TcpStream, id: u64, inputs: Sender<Input>) -> std::io::Result<Self> {
+    pub(super) fn new<M: Machine>(
+        stream: TcpStream,
+        id: u64,
+        inputs: Sender<Input>,
+    ) -> std::io::Result<Self> {
         stream.set_nodelay(true)?;
         stream.set_write_timeout(Some(WRITE))?;
         let address = stream.peer_addr()?;
         let reading = stream.try_clone()?;
-        let thread = Builder::new().name("robot-sim-read".to_owned());
+        let thread = Builder::new().name(format!("{}-read", M::NAME));
         thread.spawn(move || read_all(reading, id, &inputs))?;
         let (splitter, bad) = (LineSplitter::new(), BadLines::default());
         Ok(Self { id, address, splitter, bad, stream })
     }
 
     /// Writes a line whole; an error means that the PC must be let go.
-    pub(super) fn say(&mut self, line: &RobotLine) -> std::io::Result<()> {
-        self.stream.write_all(line.format().as_bytes())
+    pub(super) fn say(&mut self, line: &str) -> std::io::Result<()> {
+        self.stream.write_all(line.as_bytes())
     }
 }
 

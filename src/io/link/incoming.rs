@@ -1,33 +1,70 @@
-//! What the robot says, line by line, with a deadline.
+//! What the other side says, line by line, with a deadline.
 
 use std::collections::VecDeque;
+use std::fmt;
 use std::io::{ErrorKind, Read};
+use std::marker::PhantomData;
 use std::net::TcpStream;
 use std::time::Duration;
 
+use super::{Dialect, Heard};
 use crate::io::clock::RunClock;
-use crate::link::{BadLines, LineFault, LineSplitter, MAX_BAD_LINES, RobotLine};
+use crate::link::{BadLines, LineFault, LineSplitter, MAX_BAD_LINES};
 use crate::time::{Span, Stamp};
 
-/// Why a connection ended, in words for the operator.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum Lost {
-    #[error("no robot at {address}: {reason}")]
+/// Why a connection ended.
+#[derive(Debug)]
+pub(super) enum Why {
     Connect { address: String, reason: String },
-    #[error("the robot did not answer HELLO")]
     NoHello,
-    #[error("no STATE from the robot for {} ms", .0.as_millis())]
     Silence(Duration),
-    #[error("the robot closed the connection")]
     Closed,
-    #[error("{MAX_BAD_LINES} lines in a row from the robot make no sense; the last: {0}")]
     BadLines(String),
-    #[error("the connection to the robot failed: {0}")]
-    Io(#[from] std::io::Error),
+    Io(std::io::Error),
 }
 
+impl From<std::io::Error> for Why {
+    fn from(error: std::io::Error) -> Self {
+        Self::Io(error)
+    }
+}
+
+/// Why a connection ended and to whom, in words for the operator.
+#[derive(Debug)]
+pub(super) struct Lost {
+    who: &'static str,
+    why: Why,
+}
+
+impl Lost {
+    /// Of a connection to this kind of other side.
+    pub(super) const fn of<D: Dialect>(why: Why) -> Self {
+        Self { who: D::NAME, why }
+    }
+}
+
+impl fmt::Display for Lost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let who = self.who;
+        match &self.why {
+            Why::Connect { address, reason } => write!(f, "no {who} at {address}: {reason}"),
+            Why::NoHello => write!(f, "the {who} did not answer HELLO"),
+            Why::Silence(time) => write!(f, "no STATE from the {who} for {} ms", time.as_millis()),
+            Why::Closed => write!(f, "the {who} closed the connection"),
+            Why::BadLines(last) => write!(
+                f,
+                "{MAX_BAD_LINES} lines in a row from the {who} make no sense; the last: {last}"
+            ),
+            Why::Io(error) => write!(f, "the connection to the {who} failed: {error}"),
+        }
+    }
+}
+
+/// A line and when it arrived.
+type Line<D> = (Stamp, Heard<<D as Dialect>::Hello, <D as Dialect>::State>);
+
 /// The reading half of a connection.
-pub(super) struct Incoming {
+pub(super) struct Incoming<D> {
     stream: TcpStream,
     clock: RunClock,
     splitter: LineSplitter,
@@ -35,9 +72,10 @@ pub(super) struct Incoming {
     arrived: Stamp,
     bad: BadLines,
     overdue: bool,
+    dialect: PhantomData<D>,
 }
 
-impl Incoming {
+impl<D: Dialect> Incoming<D> {
     pub(super) fn new(stream: TcpStream, clock: RunClock) -> Self {
         Self {
             stream,
@@ -47,14 +85,15 @@ impl Incoming {
             arrived: clock.now(),
             bad: BadLines::default(),
             overdue: false,
+            dialect: PhantomData,
         }
     }
 
     /// The next line that makes sense, and when it arrived; none when there is
     /// none by the deadline. Bytes that wait in the socket at the deadline are
     /// still read once, so that a PC that was late itself does not blame the
-    /// robot.
-    pub(super) fn next(&mut self, deadline: Stamp) -> Result<Option<(Stamp, RobotLine)>, Lost> {
+    /// other side.
+    pub(super) fn next(&mut self, deadline: Stamp) -> Result<Option<Line<D>>, Why> {
         loop {
             if let Some(piece) = self.pending.pop_front() {
                 if let Some(line) = self.understand(piece)? {
@@ -72,9 +111,12 @@ impl Incoming {
         }
     }
 
-    fn understand(&mut self, piece: Result<String, LineFault>) -> Result<Option<RobotLine>, Lost> {
+    fn understand(
+        &mut self,
+        piece: Result<String, LineFault>,
+    ) -> Result<Option<Heard<D::Hello, D::State>>, Why> {
         let why = match piece {
-            Ok(text) => match RobotLine::parse(&text) {
+            Ok(text) => match D::understand(&text) {
                 Ok(line) => {
                     self.bad.good();
                     return Ok(Some(line));
@@ -83,16 +125,16 @@ impl Incoming {
             },
             Err(fault) => fault.to_string(),
         };
-        tracing::warn!(%why, "a line from the robot was dropped");
-        if self.bad.bad() { Err(Lost::BadLines(why)) } else { Ok(None) }
+        tracing::warn!(%why, "a line from the {} was dropped", D::NAME);
+        if self.bad.bad() { Err(Why::BadLines(why)) } else { Ok(None) }
     }
 
-    fn read(&mut self, left: Span) -> Result<(), Lost> {
+    fn read(&mut self, left: Span) -> Result<(), Why> {
         let wait = Duration::from_nanos(u64::try_from(left.ns()).unwrap_or(0));
         self.stream.set_read_timeout(Some(wait.max(Duration::from_millis(1))))?;
         let mut bytes = [0; 4096];
         match self.stream.read(&mut bytes) {
-            Ok(0) => Err(Lost::Closed),
+            Ok(0) => Err(Why::Closed),
             Ok(count) => {
                 self.arrived = self.clock.now();
                 self.pending.extend(self.splitter.push(&bytes[..count]));

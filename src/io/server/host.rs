@@ -1,19 +1,17 @@
-//! The simulated robot's own thread: lines in, `STATE` out, one PC at a time.
+//! The machine's own thread: lines in, `STATE` out, one PC at a time.
 
 use std::net::TcpStream;
-use std::sync::Arc;
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 
 use super::peer::Peer;
-use super::{Notice, Shared};
-use crate::control::RobotMode;
-use crate::link::robot_line::mode_word;
-use crate::link::{Job, LineFault, PcLine, RobotLine};
+use super::{Answer, Machine, Notice};
+use crate::io::clock::RunClock;
+use crate::link::LineFault;
 use crate::time::{Span, Stamp};
 
-/// What wakes the robot.
+/// What wakes the machine.
 #[derive(Debug)]
 pub(super) enum Input {
     /// A PC called.
@@ -26,27 +24,25 @@ pub(super) enum Input {
     Quit,
 }
 
-pub(super) struct Robot {
-    shared: Arc<Shared>,
+pub(super) struct Host<M> {
+    machine: M,
+    clock: RunClock,
     inputs: Sender<Input>,
-    job: Job,
     period: Span,
     notice: Notice,
     peer: Option<Peer>,
     connections: u64,
-    mode: RobotMode,
 }
 
-impl Robot {
+impl<M: Machine> Host<M> {
     pub(super) fn new(
-        shared: Arc<Shared>,
+        machine: M,
+        clock: RunClock,
         inputs: Sender<Input>,
-        job: Job,
         period: Span,
         notice: Notice,
     ) -> Self {
-        let mode = RobotMode::Idle;
-        Self { shared, inputs, job, period, notice, peer: None, connections: 0, mode }
+        Self { machine, clock, inputs, period, notice, peer: None, connections: 0 }
     }
 
     pub(super) fn run(mut self, received: &Receiver<Input>) {
@@ -63,16 +59,18 @@ impl Robot {
             }
             let now = self.now();
             if now >= next_state {
-                self.tick(now);
+                if let Some(state) = self.machine.tick(now) {
+                    self.say(&state);
+                }
                 // A machine that was late does not make up for it in a burst.
                 next_state = (next_state + self.period).max(now);
             }
-            self.watch_mode();
+            self.watch();
         }
     }
 
     fn now(&self) -> Stamp {
-        self.shared.clock.now()
+        self.clock.now()
     }
 
     fn tell(&mut self, text: &str) {
@@ -80,33 +78,16 @@ impl Robot {
         (self.notice)(now, text);
     }
 
-    fn tick(&mut self, now: Stamp) {
-        let (state, report) = {
-            let mut cell = self.shared.cell();
-            self.job.advance(now, &mut cell);
-            (cell.state(now), cell.report(now).filter(|_| cell.greeted()))
-        };
-        self.shared.remember(now, state);
-        if let Some(report) = report {
-            self.say(&report);
-        }
-    }
-
     fn connected(&mut self, stream: TcpStream) {
         self.connections += 1;
-        let peer = match Peer::new(stream, self.connections, self.inputs.clone()) {
+        let peer = match Peer::new::<M>(stream, self.connections, self.inputs.clone()) {
             Ok(peer) => peer,
             Err(error) => return self.tell(&format!("a PC called and was lost: {error}")),
         };
         let instead = if self.peer.is_some() { ", in place of the one before" } else { "" };
         let text = format!("PC connected from {}{instead}", peer.address);
         self.peer = Some(peer);
-        {
-            let now = self.now();
-            let mut cell = self.shared.cell();
-            cell.connect(now);
-            self.job.connected(cell.mode());
-        }
+        self.machine.connected(self.clock.now());
         self.tell(&text);
     }
 
@@ -118,8 +99,8 @@ impl Robot {
 
     fn let_go(&mut self, why: &str) {
         self.peer = None;
-        self.shared.cell().disconnect(self.now());
-        self.tell(&format!("{why}; the last setpoint runs out"));
+        self.machine.disconnected(self.clock.now());
+        self.tell(&format!("{why}; {} runs out", M::LEFT));
     }
 
     fn heard(&mut self, id: u64, bytes: &[u8]) {
@@ -132,53 +113,50 @@ impl Robot {
     /// A line, unless it was sent after the one that ended the connection.
     fn line(&mut self, piece: Result<String, LineFault>) {
         let Some(peer) = self.peer.as_mut() else { return };
-        let parsed = match piece {
-            Ok(text) => PcLine::parse(&text).map_err(|error| error.to_string()),
+        let taken = match piece {
+            Ok(text) => {
+                let taken = self.machine.take(self.clock.now(), &text);
+                taken.map_err(|error| error.to_string())
+            }
             Err(fault) => Err(fault.to_string()),
         };
-        let (answer, end) = match parsed {
-            Ok(line) => {
+        let (answer, end) = match taken {
+            Ok(taken) => {
                 peer.bad.good();
-                let answer = self.shared.cell().take(self.shared.clock.now(), line);
-                (answer, (line == PcLine::Bye).then_some("the PC said BYE"))
+                (taken.answer, taken.bye.then_some("the PC said BYE"))
             }
             Err(why) => {
                 let end = peer.bad.bad().then_some("three lines in a row make no sense");
-                (Some(self.shared.cell().bad_line(&why)), end)
+                (Some(self.machine.bad_line(&why)), end)
             }
         };
         if let Some(answer) = answer {
             self.answer(&answer);
         }
-        self.watch_mode();
+        self.watch();
         if let Some(why) = end {
             self.let_go(why);
         }
     }
 
-    fn answer(&mut self, answer: &RobotLine) {
-        if let RobotLine::Err { seq, code, text } = answer {
+    fn answer(&mut self, answer: &Answer) {
+        if let Some((seq, code, text)) = &answer.refused {
             let line = if *seq == 0 { "a line".to_owned() } else { format!("line {seq}") };
             self.tell(&format!("{line} refused: {code}, {text}"));
         }
-        self.say(answer);
+        self.say(&answer.line);
     }
 
-    fn say(&mut self, line: &RobotLine) {
+    fn say(&mut self, line: &str) {
         let Some(peer) = self.peer.as_mut() else { return };
         if let Err(error) = peer.say(line) {
             self.let_go(&format!("the PC takes no bytes: {error}"));
         }
     }
 
-    fn watch_mode(&mut self) {
-        let state = self.shared.cell().state(self.now());
-        if state.mode == self.mode {
-            return;
+    fn watch(&mut self) {
+        if let Some(news) = self.machine.news(self.clock.now()) {
+            self.tell(&news);
         }
-        let (from, to) = (mode_word(self.mode), mode_word(state.mode));
-        self.mode = state.mode;
-        let (path, z) = (state.path_mm.get(), state.z_mm.get());
-        self.tell(&format!("{from} -> {to} at path {path:.1} mm, z {z:.1} mm"));
     }
 }

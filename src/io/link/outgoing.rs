@@ -1,0 +1,138 @@
+//! What leaves the PC: numbered and written by the caller's thread.
+
+use std::io::{ErrorKind, Write};
+use std::net::{Shutdown, TcpStream};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::{Dialect, LinkTiming, Unsent, Written};
+use crate::io::clock::RunClock;
+use crate::link::PcLine;
+
+/// The writing half of the link, shared with the thread that reads.
+#[derive(Debug)]
+pub(super) struct Outgoing<D: Dialect> {
+    pub(super) address: String,
+    pub(super) timing: LinkTiming,
+    pub(super) clock: RunClock,
+    closing: AtomicBool,
+    state: Mutex<State<D>>,
+}
+
+#[derive(Debug)]
+struct State<D: Dialect> {
+    open: Option<Open<D>>,
+    /// Why writing ended the connection.
+    broken: Option<String>,
+}
+
+/// A connection on which the other side has answered `HELLO`.
+#[derive(Debug)]
+pub struct Open<D: Dialect> {
+    /// What the other side says of itself.
+    pub hello: D::Hello,
+    /// Number of the next line.
+    pub next_seq: u64,
+    /// Its newest `STATE`, once there was one.
+    pub newest: Option<D::State>,
+    stream: TcpStream,
+}
+
+impl<D: Dialect> Outgoing<D> {
+    pub(super) const fn new(address: String, timing: LinkTiming, clock: RunClock) -> Self {
+        let state = Mutex::new(State { open: None, broken: None });
+        Self { address, timing, clock, closing: AtomicBool::new(false), state }
+    }
+
+    /// Whether the link is being closed in order.
+    pub(super) fn closing(&self) -> bool {
+        self.closing.load(Ordering::Acquire)
+    }
+
+    pub(super) fn connected(&self) -> bool {
+        self.lock().open.is_some()
+    }
+
+    /// Lines may be written to this connection from now on, counted from 1.
+    pub(super) fn opened(&self, stream: TcpStream, hello: D::Hello) {
+        let open = Some(Open { stream, hello, next_seq: 1, newest: None });
+        *self.lock() = State { open, broken: None };
+    }
+
+    /// The newest `STATE`.
+    pub(super) fn seen(&self, state: D::State) {
+        if let Some(open) = self.lock().open.as_mut() {
+            open.newest = Some(state);
+        }
+    }
+
+    /// The connection is of no use any more; says why, where it was writing
+    /// that failed.
+    pub(super) fn lost(&self) -> Option<String> {
+        let state = std::mem::replace(&mut *self.lock(), State { open: None, broken: None });
+        state.broken
+    }
+
+    /// Says `BYE` and makes the reading thread wake up.
+    pub(super) fn close(&self) {
+        self.closing.store(true, Ordering::Release);
+        if let Some(mut open) = self.lock().open.take() {
+            if let Err(error) = write_line(&mut open.stream, &PcLine::Bye.format()) {
+                tracing::debug!(%error, "BYE could not be written");
+            }
+            open.shut();
+        }
+    }
+
+    pub(super) fn send<E: From<Unsent>>(
+        &self,
+        line: impl FnOnce(&Open<D>) -> Result<String, E>,
+    ) -> Result<Written, E> {
+        let mut guard = self.lock();
+        let open = guard.open.as_mut().ok_or(Unsent::NotConnected)?;
+        let line = line(open)?;
+        match write_line(&mut open.stream, &line) {
+            Ok(()) => {
+                let seq = open.next_seq;
+                open.next_seq += 1;
+                Ok(Written { seq, at: self.clock.now() })
+            }
+            Err(error) => {
+                open.shut();
+                let reason = reason::<D>(&error);
+                let broken = Some(format!("writing to the {} failed: {reason}", D::NAME));
+                *guard = State { open: None, broken };
+                Err(Unsent::Write { reason }.into())
+            }
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State<D>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl<D: Dialect> Open<D> {
+    fn shut(&self) {
+        // A connection that is gone already cannot be shut; that is as good.
+        let _ = self.stream.shutdown(Shutdown::Both);
+    }
+}
+
+/// Writes a line whole, in one go: half a line would be worse than none.
+pub(super) fn write_line(stream: &mut TcpStream, line: &str) -> std::io::Result<()> {
+    let written = stream.write(line.as_bytes())?;
+    if written < line.len() {
+        return Err(ErrorKind::TimedOut.into());
+    }
+    Ok(())
+}
+
+fn reason<D: Dialect>(error: &std::io::Error) -> String {
+    match error.kind() {
+        ErrorKind::WouldBlock | ErrorKind::TimedOut => {
+            format!("the {} does not take any bytes", D::NAME)
+        }
+        _ => error.to_string(),
+    }
+}
