@@ -3,6 +3,8 @@
 pub mod calibration_file;
 pub mod camera;
 pub mod clock;
+pub mod extruder;
+pub mod extruder_sim;
 pub mod foxglove;
 pub mod image_file;
 pub mod link;

@@ -8,9 +8,11 @@
 //!
 //! ASCII lines ended by LF, at most [`MAX_LINE`] bytes with it, fields
 //! separated by one space. `robot/PROTOCOL.md` tells the same to the person who
-//! programs a robot controller.
+//! programs a robot controller. [`extruder`] is the link to an extruder, in the
+//! same manner.
 
 pub mod cell;
+pub mod extruder;
 mod fields;
 pub mod job;
 pub mod motion;

@@ -77,6 +77,13 @@ impl ExtruderPort for NoExtruder {
     }
 }
 
+/// An extruder or none, where a cell may have one.
+impl<X: ExtruderPort> ExtruderPort for Option<X> {
+    fn send(&mut self, now: Stamp, command: ExtruderCommand) -> bool {
+        self.as_mut().is_some_and(|extruder| extruder.send(now, command))
+    }
+}
+
 /// Keeps what happened.
 pub trait Recorder {
     /// Keeps an event and the step that answered it, in this order. Fails when

@@ -39,14 +39,16 @@ impl<R: RobotPort, K: Recorder, X: ExtruderPort> Runner<R, K, X> {
     }
 
     /// Answers an event: step, send, record, in this order, so that the disk
-    /// is never between a decision and the robot. What cannot be recorded ends
-    /// control in hold.
+    /// is never between a decision and the machine. Where both sides are told
+    /// something, as at the end of a run, the extruder is told first: a robot
+    /// that stops under a running pump is worse than the other way round. What
+    /// cannot be recorded ends control in hold.
     pub fn handle(&mut self, now: Stamp, event: &Event) -> Handled {
         let step = self.controller.step(now, event);
-        let sent = step.command.and_then(|command| self.robot.send(now, command));
         if let Some(command) = step.extruder.and_then(|extruder| extruder.command) {
             let _ = self.extruder.send(now, command);
         }
+        let sent = step.command.and_then(|command| self.robot.send(now, command));
         if self.failure.is_none()
             && let Err(error) = self.recorder.record(now, event, &step)
         {

@@ -33,6 +33,27 @@ impl Drive {
         ("filling", Self::Filling),
     ];
 
+    /// All of them with the word for the unit that ends the keys of a cell file
+    /// and stands on the extruder link.
+    const UNIT_WORDS: [(&'static str, Self); 6] = [
+        ("rpm", Self::Rpm),
+        ("v", Self::Volts),
+        ("mpa", Self::Pressure),
+        ("mm3_per_s", Self::Flow),
+        ("kg_per_s", Self::MassFlow),
+        ("filling", Self::Filling),
+    ];
+
+    /// The word for its unit, such as `rpm`.
+    pub fn unit_word(self) -> &'static str {
+        Self::UNIT_WORDS.into_iter().find(|known| known.1 == self).map_or("", |known| known.0)
+    }
+
+    /// The one whose unit has this word.
+    pub fn of_unit_word(word: &str) -> Option<Self> {
+        Self::UNIT_WORDS.into_iter().find(|known| known.0 == word).map(|known| known.1)
+    }
+
     /// Its unit.
     pub const fn unit(self) -> Unit {
         match self {

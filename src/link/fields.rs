@@ -58,6 +58,14 @@ pub enum LineError {
         /// Its version.
         found: u64,
     },
+    /// The extruder's smallest command lies above its largest.
+    #[error("HELLO: the smallest command {min} lies above the largest {max}")]
+    Range {
+        /// Smallest.
+        min: f64,
+        /// Largest.
+        max: f64,
+    },
     /// The robot's slowest speed lies above its fastest.
     #[error("HELLO: the slowest speed {min} lies above the fastest {max}")]
     Limits {
@@ -109,6 +117,35 @@ impl<'a> Fields<'a> {
         match word.parse::<f64>().map(&unit) {
             Ok(Ok(value)) if plain => Ok(value),
             _ => Err(self.wrong(field, "a number with a decimal point and no exponent", word)),
+        }
+    }
+
+    /// The next field as a number in a unit that the line itself does not tell.
+    pub(super) fn number(&mut self, field: &'static str) -> Result<f64, LineError> {
+        self.decimal(field, |value| {
+            if value.is_finite() { Ok(value) } else { Err(NotFinite { value, unit: "" }) }
+        })
+    }
+
+    /// The next field as a reading, which is `-` where there is no sensor.
+    pub(super) fn reading<T>(
+        &mut self,
+        field: &'static str,
+        unit: impl Fn(f64) -> Result<T, NotFinite>,
+    ) -> Result<Option<T>, LineError> {
+        if self.rest.clone().next() == Some("-") {
+            self.rest.next();
+            return Ok(None);
+        }
+        self.decimal(field, unit).map(Some)
+    }
+
+    /// The next field as a switch.
+    pub(super) fn switch(&mut self, field: &'static str) -> Result<bool, LineError> {
+        match self.word(field)? {
+            "0" => Ok(false),
+            "1" => Ok(true),
+            found => Err(self.wrong(field, "0 or 1", found)),
         }
     }
 
@@ -164,7 +201,12 @@ pub fn on_wire(speed: MmPerS) -> MmPerS {
 
 /// A number with as many decimals as it needs, at most six, without exponent.
 pub(super) fn decimal(value: f64) -> String {
-    let text = format!("{:.DECIMALS$}", value.clamp(-LARGEST, LARGEST));
+    decimal_within(value, LARGEST)
+}
+
+/// The same, for a number that is cut to a smaller magnitude.
+pub(super) fn decimal_within(value: f64, largest: f64) -> String {
+    let text = format!("{:.DECIMALS$}", value.clamp(-largest, largest));
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }

@@ -73,13 +73,8 @@ impl RobotLine {
             "HELLO" => parse_hello(Fields::new("HELLO", words)),
             "STATE" => parse_state(Fields::new("STATE", words)),
             "ERR" => {
-                let mut fields = Fields::new("ERR", words);
-                let seq = fields.whole("seq")?;
-                let word = fields.word("code")?;
-                let code = ErrCode::ALL.into_iter().find(|code| code.word() == word);
-                let expected = "STALE, RANGE, SEQUENCE, MODE or FORM";
-                let code = code.ok_or_else(|| fields.wrong("code", expected, word))?;
-                Ok(Self::Err { seq, code, text: fields.text() })
+                let (seq, code, text) = parse_err(Fields::new("ERR", words))?;
+                Ok(Self::Err { seq, code, text })
             }
             found => Err(LineError::Keyword { found: found.to_owned(), expected: KEYWORDS }),
         }
@@ -93,7 +88,7 @@ impl RobotLine {
                 let (min, max) = (robot.min_mm_per_s.get(), robot.max_mm_per_s.get());
                 let (min, max) = (decimal(min), decimal(max));
                 let hold = decimal(robot.hold_mm_per_s.get());
-                format!("HELLO {VERSION} {} {min} {max} {hold}\n", one_word(&robot.name))
+                format!("HELLO {VERSION} {} {min} {max} {hold}\n", one_word(&robot.name, "robot"))
             }
             Self::State(state) => {
                 let mode = mode_word(state.mode);
@@ -101,13 +96,26 @@ impl RobotLine {
                 let (path, z) = (decimal(state.path_mm.get()), decimal(state.z_mm.get()));
                 format!("STATE {} {} {mode} {speed} {path} {z}\n", state.t_ms, state.seq)
             }
-            Self::Err { seq, code, text } => {
-                let head = format!("ERR {seq} {code} ");
-                let text = printing(text, MAX_LINE - 1 - head.len());
-                format!("{head}{text}\n")
-            }
+            Self::Err { seq, code, text } => format_err(*seq, *code, text),
         }
     }
+}
+
+/// Reads the fields of an `ERR` line.
+pub(super) fn parse_err(mut fields: Fields<'_>) -> Result<(u64, ErrCode, String), LineError> {
+    let seq = fields.whole("seq")?;
+    let word = fields.word("code")?;
+    let code = ErrCode::ALL.into_iter().find(|code| code.word() == word);
+    let expected = "STALE, RANGE, SEQUENCE, MODE or FORM";
+    let code = code.ok_or_else(|| fields.wrong("code", expected, word))?;
+    Ok((seq, code, fields.text()))
+}
+
+/// An `ERR` line with its LF; its text is cut where it is too long.
+pub(super) fn format_err(seq: u64, code: ErrCode, text: &str) -> String {
+    let head = format!("ERR {seq} {code} ");
+    let text = printing(text, MAX_LINE - 1 - head.len());
+    format!("{head}{text}\n")
 }
 
 fn parse_hello(mut fields: Fields<'_>) -> Result<RobotLine, LineError> {
@@ -150,9 +158,10 @@ fn mode_of(word: &str) -> Option<RobotMode> {
     [Idle, Print, Hold, Stop, Fault].into_iter().find(|&mode| mode_word(mode) == word)
 }
 
-fn one_word(name: &str) -> String {
+/// A name as one word of at most [`LONGEST_NAME`] characters.
+pub(super) fn one_word(name: &str, instead: &str) -> String {
     let word = printing(name, LONGEST_NAME).replace(' ', "-");
-    if word.is_empty() { "robot".to_owned() } else { word }
+    if word.is_empty() { instead.to_owned() } else { word }
 }
 
 #[cfg(test)]

@@ -115,17 +115,23 @@ impl SimExtruder {
         if self.valve.on { self.plant.flow() } else { Mm3PerS::ZERO }
     }
 
-    /// What it reports.
-    pub fn report(&mut self) -> ExtruderReport {
+    /// What the pump does, and whether the valve is open.
+    pub const fn state(&self) -> (PumpMode, bool) {
         let pump = match (self.pump.told, self.pump.on) {
             (true, true) => PumpMode::On,
             (true, false) => PumpMode::Starting,
             (false, true) => PumpMode::Stopping,
             (false, false) => PumpMode::Off,
         };
+        (pump, self.valve.on)
+    }
+
+    /// What it reports.
+    pub fn report(&mut self) -> ExtruderReport {
+        let (pump, valve_open) = self.state();
         let mut report = ExtruderReport {
             pump,
-            valve_open: self.valve.on,
+            valve_open,
             screw_rpm: None,
             pressure_mpa: None,
             flow_mm3_per_s: None,
@@ -147,13 +153,6 @@ impl ExtruderPort for SimExtruder {
         self.pump.advance(now);
         self.valve.advance(now);
         true
-    }
-}
-
-/// An extruder or none, where a cell may have one.
-impl ExtruderPort for Option<SimExtruder> {
-    fn send(&mut self, now: Stamp, command: ExtruderCommand) -> bool {
-        self.as_mut().is_some_and(|extruder| extruder.send(now, command))
     }
 }
 

@@ -1,0 +1,224 @@
+//! Lines from the extruder to the PC.
+
+use super::{decimal, switch};
+use crate::extruder::{Drive, ExtruderReport, PumpMode};
+use crate::link::VERSION;
+use crate::link::fields::{Fields, LineError};
+use crate::link::robot_line::{ErrCode, format_err, one_word, parse_err};
+use crate::units::{MPa, Mm, Mm3PerS, Rpm};
+
+const KEYWORDS: &str = "HELLO, STATE or ERR";
+
+/// What an extruder says of itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtruderHello {
+    /// Its name, one word.
+    pub name: String,
+    /// What it is commanded in.
+    pub drive: Drive,
+    /// Smallest command that it takes while the pump is to run, in the unit of
+    /// `drive`.
+    pub min: f64,
+    /// Largest command that it takes, in the same unit.
+    pub max: f64,
+}
+
+/// What an extruder does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExtruderStatus {
+    /// Its own clock \[ms\].
+    pub t_ms: u64,
+    /// The last line that it applied on this connection.
+    pub seq: u64,
+    /// Pump, valve and readings.
+    pub report: ExtruderReport,
+}
+
+/// A line from the extruder to the PC.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ExtruderLine {
+    /// Answer to the PC's `HELLO`.
+    Hello(ExtruderHello),
+    /// What the extruder does, every 5 to 200 ms.
+    State(ExtruderStatus),
+    /// A refused line.
+    Err {
+        /// Number of the refused line; 0 where it had none that could be read.
+        seq: u64,
+        /// Why.
+        code: ErrCode,
+        /// Why, for the operator.
+        text: String,
+    },
+}
+
+impl ExtruderLine {
+    /// Reads a line without its LF.
+    pub fn parse(text: &str) -> Result<Self, LineError> {
+        let mut words = text.split(' ');
+        match words.next().unwrap_or_default() {
+            "" => Err(LineError::Empty),
+            "HELLO" => parse_hello(Fields::new("HELLO", words)),
+            "STATE" => parse_state(Fields::new("STATE", words)),
+            "ERR" => {
+                let (seq, code, text) = parse_err(Fields::new("ERR", words))?;
+                Ok(Self::Err { seq, code, text })
+            }
+            found => Err(LineError::Keyword { found: found.to_owned(), expected: KEYWORDS }),
+        }
+    }
+
+    /// The line with its LF, at most [`crate::link::MAX_LINE`] bytes. Numbers
+    /// keep six decimals, a name becomes one word, a text is cut where it is
+    /// too long.
+    pub fn format(&self) -> String {
+        match self {
+            Self::Hello(hello) => {
+                let (unit, name) = (hello.drive.unit_word(), one_word(&hello.name, "extruder"));
+                let (min, max) = (decimal(hello.min), decimal(hello.max));
+                format!("HELLO {VERSION} {name} {unit} {min} {max}\n")
+            }
+            Self::State(ExtruderStatus { t_ms, seq, report }) => {
+                let (pump, valve) = (pump_word(report.pump), switch(report.valve_open));
+                let rpm = reading(report.screw_rpm.map(Rpm::get));
+                let mpa = reading(report.pressure_mpa.map(MPa::get));
+                let flow = reading(report.flow_mm3_per_s.map(Mm3PerS::get));
+                let filled = reading(report.filled_mm.map(Mm::get));
+                format!("STATE {t_ms} {seq} {pump} {valve} {rpm} {mpa} {flow} {filled}\n")
+            }
+            Self::Err { seq, code, text } => format_err(*seq, *code, text),
+        }
+    }
+}
+
+fn parse_hello(mut fields: Fields<'_>) -> Result<ExtruderLine, LineError> {
+    fields.version()?;
+    let name = fields.word("name")?.to_owned();
+    let word = fields.word("unit")?;
+    let expected = "rpm, v, mpa, mm3_per_s, kg_per_s or filling";
+    let drive = Drive::of_unit_word(word).ok_or_else(|| fields.wrong("unit", expected, word))?;
+    let min = fields.number("min")?;
+    let max = fields.number("max")?;
+    if min > max {
+        return Err(LineError::Range { min, max });
+    }
+    fields.end(ExtruderLine::Hello(ExtruderHello { name, drive, min, max }))
+}
+
+fn parse_state(mut fields: Fields<'_>) -> Result<ExtruderLine, LineError> {
+    let t_ms = fields.whole("t_ms")?;
+    let seq = fields.whole("seq")?;
+    let word = fields.word("pump")?;
+    let expected = "OFF, STARTING, ON, STOPPING or FAULT";
+    let pump = pump_of(word).ok_or_else(|| fields.wrong("pump", expected, word))?;
+    let report = ExtruderReport {
+        pump,
+        valve_open: fields.switch("valve")?,
+        screw_rpm: fields.reading("rpm", Rpm::new)?,
+        pressure_mpa: fields.reading("mpa", MPa::new)?,
+        flow_mm3_per_s: fields.reading("mm3_per_s", Mm3PerS::new)?,
+        filled_mm: fields.reading("filled_mm", Mm::new)?,
+    };
+    fields.end(ExtruderLine::State(ExtruderStatus { t_ms, seq, report }))
+}
+
+/// A reading as it stands on a line; `-` where there is no sensor.
+fn reading(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".to_owned(), decimal)
+}
+
+/// The word of a pump's mode on the link.
+pub const fn pump_word(pump: PumpMode) -> &'static str {
+    match pump {
+        PumpMode::Off => "OFF",
+        PumpMode::Starting => "STARTING",
+        PumpMode::On => "ON",
+        PumpMode::Stopping => "STOPPING",
+        PumpMode::Fault => "FAULT",
+    }
+}
+
+fn pump_of(word: &str) -> Option<PumpMode> {
+    use PumpMode::{Fault, Off, On, Starting, Stopping};
+    [Off, Starting, On, Stopping, Fault].into_iter().find(|&pump| pump_word(pump) == word)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::on_wire;
+    use super::*;
+    use crate::link::{LineSplitter, MAX_LINE};
+
+    #[test]
+    fn the_lines_of_the_document_are_understood() {
+        for text in [
+            "HELLO 1 pump-3 rpm 0 90",
+            "HELLO 1 x kg_per_s 0 0.5",
+            "STATE 5040 17 ON 1 62.5 1.25 - -",
+            "STATE 5040 0 OFF 0 - - 12.5 -",
+            "STATE 5040 0 STOPPING 0 - - - 102.5",
+            "ERR 4 RANGE 200 rpm is too fast",
+        ] {
+            assert_eq!(ExtruderLine::parse(text).unwrap().format(), format!("{text}\n"));
+        }
+        let state = ExtruderLine::parse("STATE 5040 17 ON 1 62.5 1.25 - -").unwrap();
+        let ExtruderLine::State(status) = state else { panic!("a STATE was expected") };
+        assert_eq!(status.report.pressure_mpa, Some(MPa::constant(1.25)));
+        assert_eq!(status.report.flow_mm3_per_s, None);
+    }
+
+    #[test]
+    fn a_line_says_what_is_wrong_with_it() {
+        let why = |text: &str| ExtruderLine::parse(text).unwrap_err().to_string();
+        assert!(why("STATE 1 0 RUN 0 - - - -").contains("OFF, STARTING, ON, STOPPING or FAULT"));
+        assert!(why("STATE 1 0 ON 1 - - -").contains("`filled_mm` is missing"));
+        assert!(why("STATE 1 0 ON 1 -- - - -").contains("`rpm` must be a number"));
+        assert!(why("STATE 1 0 ON 1 nan - - -").contains("`rpm` must be a number"));
+        assert!(why("HELLO 1 x bar 0 90").contains("kg_per_s or filling, found `bar`"));
+        assert!(why("HELLO 1 x rpm 90 0").contains("90 lies above the largest 0"));
+        assert!(why("HELLO 2 x rpm 0 90").contains("version 2"));
+        assert!(why("ERR 1 OOPS x").contains("found `OOPS`"));
+    }
+
+    fn reading() -> impl Strategy<Value = Option<f64>> {
+        prop::option::of((-1e9..1e9).prop_map(on_wire))
+    }
+
+    proptest! {
+        #[test]
+        fn every_formatted_state_parses_back(
+            t_ms in any::<u64>(),
+            seq in any::<u64>(),
+            mode in 0..5_usize,
+            valve_open in any::<bool>(),
+            readings in (reading(), reading(), reading(), reading()),
+        ) {
+            use PumpMode::{Fault, Off, On, Starting, Stopping};
+            let report = ExtruderReport {
+                pump: [Off, Starting, On, Stopping, Fault][mode],
+                valve_open,
+                screw_rpm: readings.0.map(Rpm::constant),
+                pressure_mpa: readings.1.map(MPa::constant),
+                flow_mm3_per_s: readings.2.map(Mm3PerS::constant),
+                filled_mm: readings.3.map(Mm::constant),
+            };
+            let line = ExtruderLine::State(ExtruderStatus { t_ms, seq, report });
+            let text = line.format();
+            prop_assert!(text.len() <= MAX_LINE, "{text}");
+            prop_assert_eq!(ExtruderLine::parse(text.trim_end()), Ok(line));
+        }
+
+        #[test]
+        fn no_bytes_panic(
+            bytes in prop::collection::vec(any::<u8>(), 0..400),
+            words in "(HELLO|STATE|ERR)( [0-9.A-Z+-]{0,22}){0,10}",
+        ) {
+            for text in LineSplitter::new().push(&bytes).into_iter().flatten() {
+                let _ = ExtruderLine::parse(&text);
+            }
+            let _ = ExtruderLine::parse(&words);
+        }
+    }
+}

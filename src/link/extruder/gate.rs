@@ -1,0 +1,280 @@
+//! The extruder's side of the link as a state machine: which commands are
+//! taken, and for how long. Time is an argument; what turns the pump stands
+//! behind it.
+
+use super::{DriveLine, ExtruderHello, ExtruderLine, ExtruderStatus};
+use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
+use crate::link::{ErrCode, MAX_VALID_MS, MIN_VALID_MS};
+use crate::time::Stamp;
+
+const NS_PER_MS: u64 = 1_000_000;
+/// What stands without a command.
+const REST: ExtruderCommand = ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 };
+
+/// Why a line is refused: the code and a text for the operator.
+type Refusal = (ErrCode, String);
+
+/// Ways in which an extruder can misbehave, for tests and rehearsals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Faults {
+    /// Refuses every command with this.
+    pub refuse: Option<ErrCode>,
+    /// Sends no `STATE`.
+    pub mute: bool,
+}
+
+/// An extruder's end of the link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gate {
+    hello: ExtruderHello,
+    clock_start_ms: u64,
+    greeted: bool,
+    expected_seq: u64,
+    applied_seq: u64,
+    /// The running command and when it is void.
+    command: Option<(ExtruderCommand, Stamp)>,
+    failed: bool,
+    faults: Faults,
+}
+
+impl Gate {
+    /// Of an extruder whose pump stands and whose clock shows `clock_start_ms`
+    /// at stamp 0.
+    pub const fn new(hello: ExtruderHello, clock_start_ms: u64) -> Self {
+        Self {
+            hello,
+            clock_start_ms,
+            greeted: false,
+            expected_seq: 1,
+            applied_seq: 0,
+            command: None,
+            failed: false,
+            faults: Faults { refuse: None, mute: false },
+        }
+    }
+
+    /// A connection, which replaces an older one. The count begins again; the
+    /// last command keeps running.
+    pub const fn connect(&mut self) {
+        self.greeted = false;
+        self.expected_seq = 1;
+        self.applied_seq = 0;
+    }
+
+    /// The connection is gone. The last command runs out.
+    pub const fn disconnect(&mut self) {
+        self.greeted = false;
+    }
+
+    /// The pump fails: it stops, and no command makes it run.
+    pub const fn fail(&mut self) {
+        self.failed = true;
+        self.command = None;
+    }
+
+    /// Whether the pump has failed.
+    pub const fn has_failed(&self) -> bool {
+        self.failed
+    }
+
+    /// What an operator does at the extruder: leaves the fault.
+    pub const fn acknowledge(&mut self) {
+        self.failed = false;
+    }
+
+    /// Misbehaves from now on.
+    pub const fn set_faults(&mut self, faults: Faults) {
+        self.faults = faults;
+    }
+
+    /// What pump and valve are to do now: the last command while it is valid,
+    /// and nothing otherwise.
+    pub fn command(&mut self, now: Stamp) -> ExtruderCommand {
+        self.command = self.command.filter(|&(_, until)| now < until);
+        self.command.map_or(REST, |(command, _)| command)
+    }
+
+    /// The `STATE` to send, with what pump, valve and sensors say; none before
+    /// `HELLO`, and while it is mute.
+    pub fn state(&self, now: Stamp, report: ExtruderReport) -> Option<ExtruderLine> {
+        let pump = if self.failed { PumpMode::Fault } else { report.pump };
+        let (t_ms, seq) = (self.clock_ms(now), self.applied_seq);
+        let report = ExtruderReport { pump, ..report };
+        let line = ExtruderLine::State(ExtruderStatus { t_ms, seq, report });
+        (self.greeted && !self.faults.mute).then_some(line)
+    }
+
+    /// Takes a line of the PC; the answer is `HELLO`, or `ERR` where the line
+    /// is refused.
+    pub fn take(&mut self, now: Stamp, line: DriveLine) -> Option<ExtruderLine> {
+        match line {
+            DriveLine::Hello => {
+                self.greeted = true;
+                Some(ExtruderLine::Hello(self.hello.clone()))
+            }
+            DriveLine::Bye => None,
+            DriveLine::Drive { seq, command, valid_ms, ref_t_ms } => {
+                let taken = self.drive(now, seq, command, (valid_ms, ref_t_ms));
+                taken.err().map(|(code, text)| ExtruderLine::Err { seq, code, text })
+            }
+        }
+    }
+
+    /// The answer to bytes that make no line.
+    pub fn bad_line(why: &str) -> ExtruderLine {
+        ExtruderLine::Err { seq: 0, code: ErrCode::Form, text: why.to_owned() }
+    }
+
+    fn drive(
+        &mut self,
+        now: Stamp,
+        seq: u64,
+        command: ExtruderCommand,
+        (valid_ms, ref_t_ms): (u64, u64),
+    ) -> Result<(), Refusal> {
+        self.check_count(seq)?;
+        if let Some(code) = self.faults.refuse {
+            return Err((code, "refused on purpose".to_owned()));
+        }
+        if self.failed && command.pump_on {
+            return Err((ErrCode::Mode, "the pump has failed".to_owned()));
+        }
+        let ExtruderHello { drive, min, max, .. } = &self.hello;
+        if command.pump_on && !(*min..=*max).contains(&command.value) {
+            let (value, unit) = (command.value, drive.unit());
+            return Err((ErrCode::Range, format!("{value} {unit} is not within {min} to {max}")));
+        }
+        let until = self.void_at(now, valid_ms, ref_t_ms)?;
+        self.command = Some((command, until));
+        self.applied_seq = seq;
+        Ok(())
+    }
+
+    /// When a command is void, if it is not already.
+    fn void_at(&self, now: Stamp, valid_ms: u64, ref_t_ms: u64) -> Result<Stamp, Refusal> {
+        if !(MIN_VALID_MS..=MAX_VALID_MS).contains(&valid_ms) {
+            let text =
+                format!("valid_ms {valid_ms} is not within {MIN_VALID_MS} to {MAX_VALID_MS}");
+            return Err((ErrCode::Range, text));
+        }
+        let t_ms = self.clock_ms(now);
+        if ref_t_ms > t_ms {
+            let text = format!("ref_t_ms {ref_t_ms} lies ahead of the extruder's {t_ms}");
+            return Err((ErrCode::Range, text));
+        }
+        let void_ms = ref_t_ms.saturating_add(valid_ms);
+        let since_start_ms = void_ms.saturating_sub(self.clock_start_ms);
+        let until = Stamp::from_ns(since_start_ms.saturating_mul(NS_PER_MS));
+        if until <= now {
+            let late_ms = t_ms.saturating_sub(void_ms);
+            return Err((ErrCode::Stale, format!("void since {late_ms} ms")));
+        }
+        Ok(until)
+    }
+
+    /// After a gap the count goes on from what came, so that one lost line
+    /// costs one refusal and not the connection.
+    fn check_count(&mut self, seq: u64) -> Result<(), Refusal> {
+        if !self.greeted {
+            return Err((ErrCode::Form, "HELLO must come first".to_owned()));
+        }
+        let expected = self.expected_seq;
+        self.expected_seq = expected.max(seq.saturating_add(1));
+        if seq == expected {
+            return Ok(());
+        }
+        Err((ErrCode::Sequence, format!("expected {expected}")))
+    }
+
+    const fn clock_ms(&self, now: Stamp) -> u64 {
+        self.clock_start_ms.saturating_add(now.ns() / NS_PER_MS)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::extruder::Drive;
+
+    const RUN: ExtruderCommand = ExtruderCommand { pump_on: true, valve_open: true, value: 60.0 };
+
+    fn at(ms: u64) -> Stamp {
+        Stamp::from_ns(ms * NS_PER_MS)
+    }
+
+    fn gate() -> Gate {
+        let hello = ExtruderHello { name: "test".into(), drive: Drive::Rpm, min: 5.0, max: 90.0 };
+        Gate::new(hello, 7000)
+    }
+
+    fn greeted() -> Gate {
+        let mut gate = gate();
+        assert!(matches!(gate.take(at(0), DriveLine::Hello), Some(ExtruderLine::Hello(_))));
+        gate
+    }
+
+    fn code(answer: Option<ExtruderLine>) -> Option<ErrCode> {
+        match answer {
+            Some(ExtruderLine::Err { code, .. }) => Some(code),
+            _ => None,
+        }
+    }
+
+    fn drive(seq: u64, command: ExtruderCommand, valid_ms: u64, ref_t_ms: u64) -> DriveLine {
+        DriveLine::Drive { seq, command, valid_ms, ref_t_ms }
+    }
+
+    #[test]
+    fn a_command_runs_out_and_pump_and_valve_go_to_rest() {
+        let mut gate = greeted();
+        assert_eq!(gate.take(at(20), drive(1, RUN, 300, 7010)), None);
+        assert_eq!(gate.command(at(309)), RUN);
+        assert_eq!(gate.command(at(310)), REST);
+        assert_eq!(code(gate.take(at(320), drive(2, RUN, 300, 7010))), Some(ErrCode::Stale));
+        assert_eq!(gate.take(at(320), drive(3, RUN, 300, 7310)), None);
+        assert_eq!(gate.command(at(609)), RUN);
+    }
+
+    #[test]
+    fn what_is_refused_leaves_the_last_command_running() {
+        let mut gate = greeted();
+        assert_eq!(gate.take(at(20), drive(1, RUN, 1000, 7000)), None);
+        let much = ExtruderCommand { value: 90.1, ..RUN };
+        for (line, why) in [
+            (drive(2, much, 300, 7010), ErrCode::Range),
+            (drive(5, RUN, 300, 7010), ErrCode::Sequence),
+            (drive(6, RUN, 99, 7010), ErrCode::Range),
+            (drive(7, RUN, 300, 7900), ErrCode::Range),
+        ] {
+            assert_eq!(code(gate.take(at(30), line)), Some(why), "{line:?}");
+        }
+        assert_eq!(gate.command(at(999)), RUN);
+        // At rest no command is too small.
+        assert_eq!(gate.take(at(40), drive(8, REST, 300, 7010)), None);
+    }
+
+    #[test]
+    fn nothing_is_taken_before_hello_and_each_connection_counts_from_one() {
+        let mut gate = gate();
+        assert_eq!(code(gate.take(at(1), drive(1, RUN, 300, 7000))), Some(ErrCode::Form));
+        let mut gate = greeted();
+        assert_eq!(gate.take(at(20), drive(1, RUN, 1000, 7000)), None);
+        gate.connect();
+        let _ = gate.take(at(30), DriveLine::Hello);
+        assert_eq!(gate.command(at(40)), RUN);
+        assert_eq!(gate.take(at(40), drive(1, RUN, 300, 7010)), None);
+    }
+
+    #[test]
+    fn a_pump_that_failed_runs_only_after_its_operator_was_there() {
+        let mut gate = greeted();
+        assert_eq!(gate.take(at(20), drive(1, RUN, 1000, 7000)), None);
+        gate.fail();
+        assert_eq!(gate.command(at(30)), REST);
+        assert_eq!(code(gate.take(at(30), drive(2, RUN, 300, 7010))), Some(ErrCode::Mode));
+        assert_eq!(gate.take(at(30), drive(3, REST, 300, 7010)), None);
+        gate.acknowledge();
+        assert_eq!(gate.take(at(30), drive(4, RUN, 300, 7010)), None);
+        assert_eq!(gate.command(at(40)), RUN);
+    }
+}
