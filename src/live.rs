@@ -2,16 +2,17 @@
 //! each in a thread of its own, around the one controller.
 //!
 //! ```text
-//! camera ─one slot, latest wins─▶ eye ─widths─▶ control ─lines─▶ robot
+//! camera ─one slot, latest wins─▶ eye ─widths─▶ control ─lines─▶ robot, extruder
 //!                                  │              │ ▲
-//!                                  └─frames─┐     │ └──── link reader
+//!                                  └─frames─┐     │ └──── link readers
 //!                                           ▼     ▼
 //!                                      recorder  scribe (widths.csv, report)
 //! ```
 //!
-//! The control thread waits for events and for the next setpoint's time, and
-//! for nothing else. Any end, wanted or not, is the same: hold, stop the
-//! robot, finish the recording, join.
+//! The control thread waits for events, for the next setpoint's time and for
+//! the next step of the extruder side, and for nothing else. Any end, wanted or
+//! not, is the same: hold, extruder off, stop the robot, finish the recording,
+//! join.
 
 mod control;
 mod eye;
@@ -23,15 +24,18 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
-use crossbeam_channel::{Receiver, bounded, unbounded};
+use crossbeam_channel::{Receiver, bounded, never, unbounded};
 
 use crate::calib::Calibration;
 use crate::config::Cell;
 use crate::config::cell::{RunPart, Source};
+use crate::config::extruder::ExtruderLink;
 use crate::controller::{Controller, Setup};
+use crate::extruder::{ExtruderSetup, FlowDemand};
 use crate::io::camera::open;
 use crate::io::camera::rendered::{RenderedCamera, RobotView};
 use crate::io::clock::RunClock;
+use crate::io::extruder::{ExtruderClient, ExtruderConfig, ExtruderConfigError, ExtruderEvent};
 use crate::io::record::{self, Incomplete, RecordConfig, RecordReport};
 use crate::io::robot::{LinkClient, LinkConfig, LinkConfigError, LinkTiming};
 use crate::offline::{LogError, Note, RunLog, Summary};
@@ -41,7 +45,7 @@ use crate::sim::render::{RenderError, Renderer};
 use crate::time::Span;
 
 pub use control::Ending;
-use control::{LinkPort, Loop};
+use control::{ExtruderWatch, LinkPort, Loop, Sources};
 use eye::Eye;
 use scribe::Scribe;
 
@@ -51,6 +55,8 @@ pub struct LiveRun {
     pub cell: Cell,
     /// Its run part.
     pub run: RunPart,
+    /// Its extruder, where it is commanded.
+    pub extruder: Option<LiveExtruder>,
     /// What a pixel means in it.
     pub calibration: Calibration,
     /// The clock that the run counts by.
@@ -67,6 +73,31 @@ pub struct LiveRun {
     pub stop: Receiver<()>,
     /// Is told what happens, in words for the operator.
     pub notice: Box<dyn FnMut(&str) + Send>,
+}
+
+/// The extruder of a live run.
+#[derive(Debug, Clone)]
+pub struct LiveExtruder {
+    /// What the controller knows of it.
+    pub setup: ExtruderSetup,
+    /// The flow that is wanted.
+    pub demand: FlowDemand,
+    /// How it is reached.
+    pub link: ExtruderLink,
+}
+
+impl LiveExtruder {
+    fn config(&self) -> ExtruderConfig {
+        let (min, max) = self.setup.limits.range();
+        ExtruderConfig {
+            address: self.link.address.clone(),
+            drive: self.setup.drive,
+            min,
+            max,
+            valid_ms: self.link.valid_ms,
+            timing: LinkTiming::default(),
+        }
+    }
 }
 
 /// How a live run went.
@@ -94,6 +125,9 @@ pub enum LiveError {
     /// The robot link cannot begin.
     #[error(transparent)]
     Link(#[from] LinkConfigError),
+    /// The extruder link cannot begin.
+    #[error(transparent)]
+    ExtruderLink(#[from] ExtruderConfigError),
     /// Results cannot be written.
     #[error(transparent)]
     Log(#[from] LogError),
@@ -109,6 +143,7 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
     let (recorder, alarm) = record::start(&live.record, &live.out)?;
     let (robot_events, from_robot) = unbounded();
     let link = LinkClient::start(link_config(&live.run), live.clock, robot_events)?;
+    let (extruder, from_extruder) = open_extruder(&live)?;
     let robot_z = Arc::new(AtomicU64::new(f64::NAN.to_bits()));
     let eye = Eye::start(
         source,
@@ -121,9 +156,17 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         live.clock,
     )?;
     let scribe = Scribe::start(live.log)?;
-    let controller = Controller::new(Setup::from(&live.run));
+    let watch = live
+        .extruder
+        .as_ref()
+        .map(|side| ExtruderWatch::new(side.config(), side.setup.feedforward_period));
+    let mut controller = Controller::new(Setup::from(&live.run));
+    if let Some(side) = live.extruder {
+        controller = controller.with_extruder(side.setup, side.demand);
+    }
     let mut control = Loop {
-        runner: Runner::new(controller, LinkPort::new(link), recorder),
+        runner: Runner::with_extruder(controller, LinkPort::new(link), extruder, recorder),
+        extruder: watch,
         clock: live.clock,
         period: Span::from_secs(1.0 / live.run.robot.rate_hz),
         duration: live.duration,
@@ -138,11 +181,20 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         speed: None,
         setpoint: None,
     };
-    let ending = control.run(&eye.seen, &from_robot, &alarm, &live.stop);
+    let ending = control.run(&Sources {
+        seen: &eye.seen,
+        robot: &from_robot,
+        extruder: &from_extruder,
+        alarm: &alarm,
+        stop: &live.stop,
+    });
     drop(ending_tell);
     let seen = eye.seen.clone();
     let superseded = eye.stop();
     control.take_rest(&seen);
+    if let Some(extruder) = control.runner.extruder_mut().take() {
+        extruder.close();
+    }
     let (_, port, recorder) = control.runner.into_parts();
     port.close();
     let dropped = recorder.frames_dropped();
@@ -154,6 +206,16 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         scribe.note(Note::Remark(format!("the recording misses the end of the run: {incomplete}")));
     }
     Ok(LiveReport { summary: scribe.finish()?, ending, recording })
+}
+
+/// The link to the extruder, where it is commanded, and what it reports.
+fn open_extruder(
+    live: &LiveRun,
+) -> Result<(Option<ExtruderClient>, Receiver<ExtruderEvent>), ExtruderConfigError> {
+    let Some(side) = &live.extruder else { return Ok((None, never())) };
+    let (events, from_extruder) = unbounded();
+    let client = ExtruderClient::start(side.config(), live.clock, events)?;
+    Ok((Some(client), from_extruder))
 }
 
 /// The camera of the cell; the rendered one also wants to hear of the robot.

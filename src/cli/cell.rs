@@ -1,5 +1,7 @@
 //! Loading a cell with all that it refers to.
 
+pub mod extruder;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -9,19 +11,21 @@ use super::WrongArguments;
 use crate::calib::{Calibration, SurfaceMap};
 use crate::config::Cell;
 use crate::config::cell::{CalibrationSource, ExtruderPart, Purpose};
-use crate::config::extruder::{FeedforwardKeys, ModelSource, Strategy};
-use crate::extruder::Law;
-use crate::extruder::feedforward::{Inverse, InverseSettings};
-use crate::extruder::law::{
-    AdaptiveNozzle, Constant, Foreseen, OperatingPoint, Played, PressureLoop, ScrewFill,
-};
-use crate::identify::profile;
-use crate::identify::quantity::Unit;
-use crate::io::{calibration_file, model_file};
+use crate::extruder::ExtruderSetup;
+use crate::io::calibration_file;
+use crate::io::record::ExtruderFile;
 use crate::sim::cell::Rig;
 use crate::sim::extruder::SimExtruder;
-use crate::time::Span;
 use crate::units::Mm;
+
+/// The extruder side of a cell that is commanded.
+#[derive(Debug, Clone)]
+pub struct ExtruderSide {
+    /// What the controller knows.
+    pub setup: ExtruderSetup,
+    /// The file that its strategy is made from, where there is one.
+    pub file: Option<ExtruderFile>,
+}
 
 /// A cell, its calibration, and their texts for the recording.
 #[derive(Debug, Clone)]
@@ -66,11 +70,19 @@ impl LoadedCell {
         Ok(Self { path: path.to_owned(), text, cell, calibration, calibration_text })
     }
 
-    /// The extruder side as a simulated cell has it; none where the cell has
-    /// none. Reads the files that the cell names for it.
-    pub fn simulated_extruder(&self) -> anyhow::Result<Option<Rig>> {
+    /// The extruder side as the controller has it; none where the cell has
+    /// none. Reads the file that the cell names for it.
+    pub fn extruder(&self) -> anyhow::Result<Option<ExtruderSide>> {
         let part = self.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
         let Some(part) = part else { return Ok(None) };
+        let cell = self.path.display().to_string();
+        let file = extruder::file(part, &cell)?;
+        let setup = extruder::setup(part, &cell, file.as_ref())?;
+        Ok(Some(ExtruderSide { setup, file }))
+    }
+
+    /// What answers the extruder's commands in a simulated cell.
+    pub fn plant(&self, part: &ExtruderPart) -> anyhow::Result<SimExtruder> {
         let Some(plant) = &part.plant else {
             return Err(WrongArguments::new(format!(
                 "{}: [extruder_plant]: found nothing, expected what answers the extruder's \
@@ -79,58 +91,21 @@ impl LoadedCell {
             ))
             .into());
         };
-        let law = match &part.extruder.strategy {
-            Strategy::Constant { value } => Law::Constant(Constant(*value)),
-            Strategy::Profile { file } => Law::Profile(read_profile(file, part)?),
-            Strategy::Feedforward(keys) => Law::Feedforward(self.foreseen(keys, part)?),
-            Strategy::Pressure(settings) => Law::Pressure(PressureLoop::new(**settings)),
-            Strategy::Screw(settings) => Law::Screw(ScrewFill::new(settings)?),
-            Strategy::Adaptive(parts) => Law::Adaptive(AdaptiveNozzle::new(parts.0, parts.1)),
-        };
-        let seed = self.cell.simulation.seed;
-        Ok(Some(Rig {
-            setup: part.extruder.setup(law),
-            demand: part.demand,
-            plant: SimExtruder::of(plant, seed)?,
-            nominal_flow: part.plant_nominal,
-        }))
+        Ok(SimExtruder::of(plant, self.cell.simulation.seed)?)
     }
 
-    /// The inverse of the model that the cell names.
-    fn foreseen(&self, keys: &FeedforwardKeys, part: &ExtruderPart) -> anyhow::Result<Foreseen> {
-        let wrong = |what: String| {
-            WrongArguments::new(format!("{}: [extruder]: {what}", self.path.display()))
-        };
-        let model = match &keys.model {
-            ModelSource::File(file) => model_file::read(file)?,
-            ModelSource::Library { folder, wanted } => {
-                let library = model_file::read_library(folder)?;
-                let found = library.find(wanted).map_err(|error| wrong(error.to_string()))?;
-                tracing::info!(model = found.entry.name, off_c = found.off_c, "model of the cell");
-                found.entry.model.clone()
-            }
-        };
-        let extruder = &part.extruder;
-        let (unit, flow) = (extruder.drive.unit(), Unit::Mm3PerS);
-        if model.input.unit != unit || model.output.unit != flow {
-            return Err(wrong(format!(
-                "found a model from {} to {}, expected one from {unit} to {flow}",
-                model.input, model.output
-            ))
-            .into());
-        }
-        let (command, flow_mm3_per_s) = model.operating_point;
-        let settings = InverseSettings {
-            time_constant_s: keys.time_constant_s,
-            right_zeros: keys.right_zeros,
-            known_ahead: Span::ZERO,
-            late: keys.late,
-            limits: extruder.limits.about(command),
-            period: Span::from_secs(1.0 / extruder.rates.feedforward_hz),
-        };
-        let inverse =
-            Inverse::new(&model.transfer, &settings).map_err(|error| wrong(error.to_string()))?;
-        Ok(Foreseen::new(inverse, OperatingPoint { command, flow_mm3_per_s }))
+    /// The extruder side as a simulated cell has it; none where the cell has
+    /// none.
+    pub fn simulated_extruder(&self) -> anyhow::Result<Option<Rig>> {
+        let part = self.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
+        let Some(part) = part else { return Ok(None) };
+        let plant = self.plant(part)?;
+        Ok(self.extruder()?.map(|side| Rig {
+            setup: side.setup,
+            demand: part.demand,
+            plant,
+            nominal_flow: part.plant_nominal,
+        }))
     }
 
     /// The map of the measured surface, for a camera that rides as the cell
@@ -155,29 +130,4 @@ impl LoadedCell {
             }
         }
     }
-}
-
-/// A profile of commands; one of another quantity, or beyond the limits, is
-/// refused before anything moves.
-fn read_profile(file: &Path, part: &ExtruderPart) -> anyhow::Result<Played> {
-    let wrong = |what: String| WrongArguments::new(format!("profile {}: {what}", file.display()));
-    let text = fs::read_to_string(file).map_err(|error| wrong(error.to_string()))?;
-    let (profile, quantity) =
-        profile::file::parse(&text).map_err(|error| wrong(error.to_string()))?;
-    let unit = part.extruder.drive.unit();
-    if quantity.unit != unit {
-        return Err(wrong(format!(
-            "found {quantity}, expected a quantity in {unit}, the command of [extruder]"
-        ))
-        .into());
-    }
-    let ((low, high), (min, max)) = (profile.range(), part.extruder.limits.range());
-    if low < min || high > max {
-        return Err(wrong(format!(
-            "found commands from {low} to {high} {unit}, expected {min} to {max}, the limits \
-             of [extruder]"
-        ))
-        .into());
-    }
-    Ok(Played::new(profile))
 }

@@ -76,7 +76,7 @@ fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
             tell!("error: the camera gives no more frames: {why}");
             return ExitCode::FAILURE;
         }
-        Ending::RobotLimits(why) => {
+        Ending::RobotLimits(why) | Ending::ExtruderUnfit(why) => {
             tell!("error: {why}");
             return ExitCode::from(2);
         }

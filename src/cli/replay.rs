@@ -9,10 +9,12 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::WrongArguments;
+use super::cell::extruder;
 use crate::config::Cell;
-use crate::config::cell::{Purpose, RunPart};
+use crate::config::cell::{ExtruderPart, Purpose, RunPart};
 use crate::control::Step;
 use crate::controller::{Controller, Setup};
+use crate::io::record::ExtruderFile;
 use crate::io::recording::{Entry, Recording};
 use crate::offline::replay::{Difference, ReplayReport, replay};
 
@@ -25,7 +27,8 @@ const EXAMPLE: &str = "\
 Example:
   truebead replay out/recording.mcap
 
-The controller is set up from the cell file that is attached to the recording.
+The controller is set up from the files that are attached to the recording: the
+cell, and a model or a profile that the cell names for its extruder.
 A recording that was cut short (recording.mcap.partial) is replayed as far as
 it goes.
 
@@ -45,7 +48,7 @@ pub struct ReplayArgs {
 /// Runs the command.
 pub fn run(args: &ReplayArgs) -> anyhow::Result<ExitCode> {
     let mut recording = Recording::open(&args.recording).map_err(WrongArguments::new)?;
-    let mut controller = Controller::new(Setup::from(&recorded_cell(&recording)?));
+    let mut controller = recorded_controller(&recording)?;
     let progress = progress_bar();
     let report =
         replay(with_progress(&mut recording, &progress), |now, event| controller.step(now, event));
@@ -59,6 +62,33 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<ExitCode> {
         bail!("{}: nothing to compare, it holds no steps", recording.file());
     }
     Ok(status)
+}
+
+/// The controller as it was at the start of the run.
+fn recorded_controller(recording: &Recording) -> anyhow::Result<Controller> {
+    let run = recorded_cell(recording)?;
+    let controller = Controller::new(Setup::from(&run));
+    let Some(part) = &run.extruder else { return Ok(controller) };
+    let file = recorded_file(recording, part)?;
+    let cell = format!("cell.toml in {}", recording.file());
+    let setup = extruder::setup(part, &cell, file.as_ref())?;
+    Ok(controller.with_extruder(setup, part.demand))
+}
+
+/// The file that the extruder's strategy is made from, where it has one.
+fn recorded_file(
+    recording: &Recording,
+    part: &ExtruderPart,
+) -> anyhow::Result<Option<ExtruderFile>> {
+    let Some(name) = extruder::attachment(&part.extruder.strategy) else { return Ok(None) };
+    let Some(text) = recording.attachment(name) else {
+        bail!(WrongArguments::new(format!(
+            "{}: the attachment {name} is missing, so the extruder's strategy cannot be set up",
+            recording.file()
+        )));
+    };
+    let source = format!("{name} in {}", recording.file());
+    Ok(Some(ExtruderFile { name, source, text: text.to_owned() }))
 }
 
 /// What a run needs, from the cell file that is attached.

@@ -8,11 +8,11 @@ use clap::Args;
 
 use super::cell::LoadedCell;
 use super::{Voice, WrongArguments, outcome};
-use crate::config::cell::Purpose;
+use crate::config::cell::{Purpose, RunPart};
 use crate::io::clock::RunClock;
-use crate::io::record::RecordConfig;
+use crate::io::record::{ExtruderFile, RecordConfig};
 use crate::io::stop::StopSignal;
-use crate::live::{self, LiveRun};
+use crate::live::{self, LiveExtruder, LiveRun};
 use crate::offline::{ControlFacts, LogOptions, RunLog};
 use crate::time::Span;
 
@@ -73,24 +73,12 @@ pub fn drive(
         }
     }
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
-    if run.extruder.is_some() {
-        return Err(WrongArguments::new(format!(
-            "{}: [extruder]: found a table, expected none in a live run: there is no link to an \
-             extruder yet; truebead simulate runs both sides",
-            loaded.path.display()
-        ))
-        .into());
-    }
+    let (extruder, extruder_file) = live_extruder(&loaded, &run)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
     let log = RunLog::create(LogOptions {
         folder: out.to_owned(),
         title,
-        about: vec![
-            ("cell".into(), loaded.path.display().to_string()),
-            ("camera".into(), run.camera.source_name.clone()),
-            ("robot".into(), run.robot.address.clone()),
-            ("calibration".into(), loaded.calibration_words()),
-        ],
+        about: about(&loaded, &run, extruder.as_ref()),
         gauge: loaded.cell.gauge,
         target: loaded.cell.target,
         max_rejected_share: loaded.cell.recording.max_rejected_share,
@@ -102,10 +90,12 @@ pub fn drive(
         cell_name: loaded.path.display().to_string(),
         cell_text: loaded.text.clone(),
         calibration_text: loaded.calibration_text.clone(),
+        extruder_file,
     };
     let quiet = voice.quiet;
     let report = live::run(LiveRun {
         run,
+        extruder,
         calibration: loaded.calibration,
         clock,
         out: out.to_owned(),
@@ -121,4 +111,40 @@ pub fn drive(
         cell: loaded.cell.clone(),
     })?;
     Ok(outcome::tell(&report, out, loaded.cell.recording.max_rejected_share))
+}
+
+/// What stands at the head of the report.
+fn about(
+    loaded: &LoadedCell,
+    run: &RunPart,
+    extruder: Option<&LiveExtruder>,
+) -> Vec<(String, String)> {
+    let mut about = vec![
+        ("cell".into(), loaded.path.display().to_string()),
+        ("camera".into(), run.camera.source_name.clone()),
+        ("robot".into(), run.robot.address.clone()),
+    ];
+    about.extend(extruder.map(|side| ("extruder".into(), side.link.address.clone())));
+    about.push(("calibration".into(), loaded.calibration_words()));
+    about
+}
+
+/// The extruder side of a live run and the file behind its strategy; none
+/// where the cell has none. Refuses an extruder that nothing says how to reach.
+fn live_extruder(
+    loaded: &LoadedCell,
+    run: &RunPart,
+) -> anyhow::Result<(Option<LiveExtruder>, Option<ExtruderFile>)> {
+    let (Some(part), Some(side)) = (&run.extruder, loaded.extruder()?) else {
+        return Ok((None, None));
+    };
+    let Some(link) = part.extruder.link.clone() else {
+        return Err(WrongArguments::new(format!(
+            "{}: extruder.driver: found nothing, expected \"line\" and an address: a live run \
+             has to reach its extruder (truebead simulate needs neither)",
+            loaded.path.display()
+        ))
+        .into());
+    };
+    Ok((Some(LiveExtruder { setup: side.setup, demand: part.demand, link }), side.file))
 }

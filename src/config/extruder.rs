@@ -3,6 +3,7 @@
 //! for limits.
 
 mod adaptive;
+mod link;
 mod plant;
 mod pressure;
 mod screw;
@@ -10,6 +11,7 @@ mod strategy;
 
 use std::path::Path;
 
+pub use link::ExtruderLink;
 pub use plant::{ExtruderPlant, LinearPlant, PlantKind, PressurePlant, ScrewPlant};
 pub use strategy::{FeedforwardKeys, ModelSource, Strategy};
 
@@ -43,6 +45,8 @@ pub struct Extruder {
     pub max_hold: Span,
     /// Pressure at which the pump is stopped, if the file says so.
     pub max_pressure: Option<MPa>,
+    /// How a live run reaches it, if the file says so.
+    pub link: Option<ExtruderLink>,
 }
 
 /// How often what is done \[Hz\].
@@ -104,6 +108,7 @@ impl Extruder {
         let max_gap = table.number("max_gap_s", 0.01..=60.0);
         let max_hold = table.number("max_hold_s", 0.1..=3600.0);
         let max_pressure = table.optional_number("max_pressure_mpa", 1e-6..=1e4);
+        let link = link::read(table, rates.map(|rates| rates.io_hz));
         Some(Self {
             drive: drive?,
             limits: limits?,
@@ -114,6 +119,7 @@ impl Extruder {
             max_gap: Span::from_secs(max_gap?),
             max_hold: Span::from_secs(max_hold?),
             max_pressure: max_pressure.and_then(|pressure| MPa::new(pressure).ok()),
+            link,
         })
     }
 

@@ -38,7 +38,7 @@ use crate::frame::Frame;
 use crate::ports::{RecordError, Recorder};
 use crate::time::Stamp;
 use encode::FrameJob;
-use format::{FORMAT_VERSION, RunInfo};
+use format::{CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, FORMAT_VERSION, RunInfo};
 use mux::Mux;
 use sink::{FileSink, Outlet, Sink};
 pub use tap::FrameTap;
@@ -57,6 +57,20 @@ pub struct RecordConfig {
     pub cell_text: String,
     /// The calibration file's text, where the cell has one.
     pub calibration_text: Option<String>,
+    /// The file that the cell names for its extruder, where there is one.
+    pub extruder_file: Option<ExtruderFile>,
+}
+
+/// A file that the strategy of an extruder is made from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExtruderFile {
+    /// What it is called in a recording: [`format::MODEL_ATTACHMENT`] or
+    /// [`format::PROFILE_ATTACHMENT`].
+    pub name: &'static str,
+    /// What messages call it.
+    pub source: String,
+    /// Its text.
+    pub text: String,
 }
 
 /// What a finished recording holds.
@@ -174,8 +188,12 @@ fn start_with<S: Sink + 'static>(
         epoch_ns: config.epoch_ns,
         cell_name: config.cell_name.clone(),
     };
-    let mut mux = Mux::new(&run, &config.cell_text, config.calibration_text.as_deref())
-        .map_err(|error| RecordError(error.to_string()))?;
+    let extruder_file = config.extruder_file.as_ref().map(|file| (file.name, file.text.as_str()));
+    let mut attachments = vec![(CELL_ATTACHMENT, config.cell_text.as_str())];
+    attachments
+        .extend(config.calibration_text.as_deref().map(|text| (CALIBRATION_ATTACHMENT, text)));
+    attachments.extend(extruder_file);
+    let mut mux = Mux::new(&run, &attachments).map_err(|error| RecordError(error.to_string()))?;
     let path = sink.path().to_path_buf();
     let mut outlet = Outlet::new(sink);
     mux.take(outlet.waiting());

@@ -173,7 +173,8 @@ impl Recording {
         self.attachment(CALIBRATION_ATTACHMENT)
     }
 
-    fn attachment(&self, name: &str) -> Option<&str> {
+    /// The text that is attached under a name, if there is one.
+    pub fn attachment(&self, name: &str) -> Option<&str> {
         self.attachments.get(name).and_then(|data| std::str::from_utf8(data).ok())
     }
 

@@ -1,5 +1,7 @@
-//! The control thread: waits for what happens and for the next setpoint's
-//! time, and lets the runner answer.
+//! The control thread: waits for what happens, for the next setpoint's time and
+//! for the next step of the extruder side, and lets the runner answer.
+
+mod extruder;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,6 +16,7 @@ use crate::control::limiter::Limits;
 use crate::control::{Command, Event, RobotLimits, RobotMode, State, Step};
 use crate::io::camera::rendered::RobotView;
 use crate::io::clock::RunClock;
+use crate::io::extruder::{ExtruderClient, ExtruderEvent};
 use crate::io::record::RecorderHandle;
 use crate::io::robot::{LinkClient, RobotEvent, Written};
 use crate::offline::{ControlColumns, FrameRow, Note, names};
@@ -22,6 +25,8 @@ use crate::runner::{Handled, Runner};
 use crate::time::{Span, Stamp};
 use crate::units::MmPerS;
 use crate::vision::Reject;
+
+pub use extruder::ExtruderWatch;
 
 /// Longest wait for the robot to say that it has stopped.
 const FAREWELL: Span = Span::from_millis(600);
@@ -41,6 +46,9 @@ pub enum Ending {
     RecordingLost(String),
     /// The robot's limits are narrower than the cell's.
     RobotLimits(String),
+    /// The extruder takes another quantity than the cell commands, or not all
+    /// of what the cell allows.
+    ExtruderUnfit(String),
 }
 
 /// The link as the runner's robot, which remembers when it last wrote.
@@ -72,9 +80,19 @@ impl RobotPort for LinkPort {
     }
 }
 
+/// Where events come from.
+pub struct Sources<'a> {
+    pub seen: &'a Receiver<Seen>,
+    pub robot: &'a Receiver<RobotEvent>,
+    pub extruder: &'a Receiver<ExtruderEvent>,
+    pub alarm: &'a Receiver<RecordError>,
+    pub stop: &'a Receiver<()>,
+}
+
 /// The control thread's own.
 pub struct Loop<'a> {
-    pub runner: Runner<LinkPort, RecorderHandle>,
+    pub runner: Runner<LinkPort, RecorderHandle, Option<ExtruderClient>>,
+    pub extruder: Option<ExtruderWatch>,
     pub clock: RunClock,
     pub period: Span,
     pub duration: Option<Span>,
@@ -84,7 +102,7 @@ pub struct Loop<'a> {
     pub scribe: &'a Scribe,
     pub notice: Box<dyn FnMut(&str) + Send>,
     pub limits: Limits,
-    pub unfit: Option<String>,
+    pub unfit: Option<Ending>,
     pub shown: Option<State>,
     pub speed: Option<MmPerS>,
     pub setpoint: Option<MmPerS>,
@@ -92,28 +110,36 @@ pub struct Loop<'a> {
 
 impl Loop<'_> {
     /// Runs until something ends it, and then ends it in order.
-    pub fn run(
-        &mut self,
-        seen: &Receiver<Seen>,
-        from_robot: &Receiver<RobotEvent>,
-        alarm: &Receiver<RecordError>,
-        stop: &Receiver<()>,
-    ) -> Ending {
-        let ending = self.until_ended(seen, from_robot, alarm, stop);
+    pub fn run(&mut self, sources: &Sources<'_>) -> Ending {
+        let ending = self.until_ended(sources);
         self.give(Event::Stop);
+        self.farewell(sources);
+        ending
+    }
+
+    /// Waits a little for robot and extruder to say that they rest.
+    fn farewell(&mut self, sources: &Sources<'_>) {
         let until = self.clock.now() + FAREWELL;
-        while self.clock.now() < until {
-            let Ok(event) = from_robot.recv_timeout(duration(until - self.clock.now())) else {
-                break;
-            };
-            let stopped = matches!(&event, RobotEvent::State { state, .. }
-                if matches!(state.mode, RobotMode::Stop | RobotMode::Idle | RobotMode::Fault));
-            self.robot(event);
-            if stopped {
-                break;
+        let mut stopped = false;
+        while !(stopped && self.extruder.as_ref().is_none_or(ExtruderWatch::rests)) {
+            let left = until - self.clock.now();
+            if left <= Span::ZERO {
+                return;
+            }
+            select! {
+                recv(sources.robot) -> message => {
+                    let Ok(event) = message else { return };
+                    stopped |= matches!(&event, RobotEvent::State { state, .. }
+                        if matches!(state.mode, RobotMode::Stop | RobotMode::Idle | RobotMode::Fault));
+                    self.robot(event);
+                }
+                recv(sources.extruder) -> message => {
+                    let Ok(event) = message else { return };
+                    self.hear_extruder(event);
+                }
+                default(duration(left)) => return,
             }
         }
-        ending
     }
 
     /// Takes down what was seen until the camera ended, so that every frame in
@@ -128,16 +154,11 @@ impl Loop<'_> {
         }
     }
 
-    fn until_ended(
-        &mut self,
-        seen: &Receiver<Seen>,
-        from_robot: &Receiver<RobotEvent>,
-        alarm: &Receiver<RecordError>,
-        stop: &Receiver<()>,
-    ) -> Ending {
+    fn until_ended(&mut self, sources: &Sources<'_>) -> Ending {
         let mut due = self.clock.now() + self.period;
+        let mut extruder_due = self.extruder.as_ref().map(|side| self.clock.now() + side.period());
         let over = self.duration.map(|duration| self.clock.now() + duration);
-        let (mut seen, mut alarm, none) = (seen.clone(), alarm.clone(), never());
+        let (mut seen, mut alarm, none) = (sources.seen.clone(), sources.alarm.clone(), never());
         let mut lost: Option<String> = None;
         loop {
             let now = self.clock.now();
@@ -154,7 +175,15 @@ impl Loop<'_> {
                 }
                 continue;
             }
-            let wait = over.map_or(due, |over| over.min(due)) - now;
+            if let (Some(at), Some(side)) = (extruder_due, &self.extruder)
+                && now >= at
+            {
+                let period = side.period();
+                self.give(Event::ExtruderTick);
+                extruder_due = Some(next_due(at, period, self.clock.now()));
+                continue;
+            }
+            let wait = [over, extruder_due].into_iter().flatten().fold(due, Stamp::min) - now;
             select! {
                 recv(seen) -> message => match message {
                     Ok(Seen::Frame(look)) => self.look(*look),
@@ -167,7 +196,10 @@ impl Loop<'_> {
                         seen = none.clone();
                     }
                 },
-                recv(from_robot) -> message => if let Ok(event) = message { self.robot(event) },
+                recv(sources.robot) -> message => if let Ok(event) = message { self.robot(event) },
+                recv(sources.extruder) -> message => {
+                    if let Ok(event) = message { self.hear_extruder(event); }
+                }
                 recv(alarm) -> message => {
                     if let Ok(error) = message {
                         self.runner.lose_recording(self.clock.now(), error.clone());
@@ -175,11 +207,11 @@ impl Loop<'_> {
                     }
                     alarm = never();
                 }
-                recv(stop) -> _ => return Ending::Asked,
+                recv(sources.stop) -> _ => return Ending::Asked,
                 default(duration(wait)) => {}
             }
-            if let Some(why) = self.unfit.take() {
-                return Ending::RobotLimits(why);
+            if let Some(ending) = self.unfit.take() {
+                return ending;
             }
             if let Some(error) = self.runner.failure() {
                 return Ending::RecordingLost(error.0.clone());
@@ -196,6 +228,7 @@ impl Loop<'_> {
             self.scribe.note(Note::SetpointSent);
         }
         self.show(now, &handled.step);
+        self.show_extruder(now, &handled.step);
         self.scribe.step(now, event, handled.step.clone());
         handled
     }
@@ -288,7 +321,7 @@ impl Loop<'_> {
             }
             RobotEvent::Up { hello: robot, .. } => {
                 (self.notice)(&format!("robot `{}` is connected", robot.name));
-                self.unfit = unfit(&self.limits, robot);
+                self.unfit = unfit(&self.limits, robot).map(Ending::RobotLimits);
             }
             RobotEvent::Down { reason, .. } => (self.notice)(&format!("robot: {reason}")),
             RobotEvent::Refused { seq, code, text, .. } => {

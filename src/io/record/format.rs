@@ -22,6 +22,10 @@ pub const RUN_METADATA: &str = "run";
 pub const CELL_ATTACHMENT: &str = "cell.toml";
 /// Attachment that holds the calibration file.
 pub const CALIBRATION_ATTACHMENT: &str = "calibration.toml";
+/// Attachment that holds the model of the extruder that the cell names.
+pub const MODEL_ATTACHMENT: &str = "extruder-model.toml";
+/// Attachment that holds the profile of commands that the cell names.
+pub const PROFILE_ATTACHMENT: &str = "extruder-profile.csv";
 /// Name of a recording that is finished.
 pub const FILE_NAME: &str = "recording.mcap";
 /// Name of a recording that is being written, or was cut short.

@@ -12,8 +12,8 @@ use ::mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 
 use super::encode::EncodedFrame;
 use super::format::{
-    CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, EVENT_SCHEMA, EVENT_TOPIC, EventMessage, IMAGE_TOPIC,
-    RUN_METADATA, RunInfo, STEP_SCHEMA, STEP_TOPIC, StepMessage,
+    EVENT_SCHEMA, EVENT_TOPIC, EventMessage, IMAGE_TOPIC, RUN_METADATA, RunInfo, STEP_SCHEMA,
+    STEP_TOPIC, StepMessage,
 };
 use super::{Answered, Counts};
 use crate::io::foxglove;
@@ -78,10 +78,11 @@ pub struct Mux {
 }
 
 impl Mux {
-    /// Writes the head of a recording: run, cell, calibration, channels. The
+    /// Writes the head of a recording: run, attached texts by their names (cell,
+    /// calibration, what the extruder needs), channels. The
     /// channels are in a small chunk of their own, so that damage further on
     /// does not make later messages unreadable.
-    pub fn new(run: &RunInfo, cell: &str, calibration: Option<&str>) -> Result<Self, MuxError> {
+    pub fn new(run: &RunInfo, attachments: &[(&str, &str)]) -> Result<Self, MuxError> {
         let shelf = Shelf::default();
         let mut writer = WriteOptions::new()
             .library(concat!("truebead ", env!("CARGO_PKG_VERSION")))
@@ -95,14 +96,13 @@ impl Mux {
             name: RUN_METADATA.to_string(),
             metadata: run.to_metadata(),
         })?;
-        let attachments = [(CELL_ATTACHMENT, Some(cell)), (CALIBRATION_ATTACHMENT, calibration)];
         for (name, text) in attachments {
-            let Some(text) = text else { continue };
+            let table = name.ends_with(".csv");
             writer.attach(&Attachment {
                 log_time: run.epoch_ns,
                 create_time: run.epoch_ns,
-                name: name.to_string(),
-                media_type: "application/toml".to_string(),
+                name: (*name).to_string(),
+                media_type: if table { "text/csv" } else { "application/toml" }.to_string(),
                 data: Cow::Borrowed(text.as_bytes()),
             })?;
         }

@@ -1,0 +1,135 @@
+//! The strategy of an extruder from its cell and the file that the cell names:
+//! from the disk for a run, from the recording for a replay.
+
+use std::fs;
+
+use crate::cli::WrongArguments;
+use crate::config::cell::ExtruderPart;
+use crate::config::extruder::{FeedforwardKeys, ModelSource, Strategy};
+use crate::extruder::feedforward::{Inverse, InverseSettings};
+use crate::extruder::law::{
+    AdaptiveNozzle, Constant, Foreseen, OperatingPoint, Played, PressureLoop, ScrewFill,
+};
+use crate::extruder::{ExtruderSetup, Law};
+use crate::identify::quantity::Unit;
+use crate::identify::{file as model, profile};
+use crate::io::model_file;
+use crate::io::record::ExtruderFile;
+use crate::io::record::format::{MODEL_ATTACHMENT, PROFILE_ATTACHMENT};
+use crate::time::Span;
+
+/// What the strategy's file is called in a recording; none where it has none.
+pub fn attachment(strategy: &Strategy) -> Option<&'static str> {
+    match strategy {
+        Strategy::Profile { .. } => Some(PROFILE_ATTACHMENT),
+        Strategy::Feedforward(_) => Some(MODEL_ATTACHMENT),
+        _ => None,
+    }
+}
+
+/// Reads the file that the cell names for its extruder; of a library the model
+/// that fits. `cell` is what messages call the cell.
+pub fn file(part: &ExtruderPart, cell: &str) -> anyhow::Result<Option<ExtruderFile>> {
+    let strategy = &part.extruder.strategy;
+    let Some(name) = attachment(strategy) else { return Ok(None) };
+    let (path, what) = match strategy {
+        Strategy::Profile { file } => (file.clone(), "profile"),
+        Strategy::Feedforward(FeedforwardKeys { model: ModelSource::File(file), .. }) => {
+            // Says what to do where there is none.
+            model_file::read(file)?;
+            (file.clone(), "model")
+        }
+        Strategy::Feedforward(FeedforwardKeys {
+            model: ModelSource::Library { folder, wanted },
+            ..
+        }) => {
+            let library = model_file::read_library(folder)?;
+            let found = library.find(wanted).map_err(|error| wrong(cell, &error.to_string()))?;
+            tracing::info!(model = found.entry.name, off_c = found.off_c, "model of the cell");
+            (folder.join(&found.entry.name), "model")
+        }
+        _ => return Ok(None),
+    };
+    let source = format!("{what} {}", path.display());
+    let text = fs::read_to_string(&path)
+        .map_err(|error| WrongArguments::new(format!("{source}: {error}")))?;
+    Ok(Some(ExtruderFile { name, source, text }))
+}
+
+/// What the extruder side of a controller has to know, with the file that its
+/// strategy is made from. `cell` is what messages call the cell.
+pub fn setup(
+    part: &ExtruderPart,
+    cell: &str,
+    file: Option<&ExtruderFile>,
+) -> anyhow::Result<ExtruderSetup> {
+    let needed = || file.ok_or_else(|| wrong(cell, "found a strategy without its file"));
+    let law = match &part.extruder.strategy {
+        Strategy::Constant { value } => Law::Constant(Constant(*value)),
+        Strategy::Profile { .. } => Law::Profile(played(needed()?, part)?),
+        Strategy::Feedforward(keys) => Law::Feedforward(foreseen(keys, part, cell, needed()?)?),
+        Strategy::Pressure(settings) => Law::Pressure(PressureLoop::new(**settings)),
+        Strategy::Screw(settings) => Law::Screw(ScrewFill::new(settings)?),
+        Strategy::Adaptive(parts) => Law::Adaptive(AdaptiveNozzle::new(parts.0, parts.1)),
+    };
+    Ok(part.extruder.setup(law))
+}
+
+fn wrong(cell: &str, what: &str) -> WrongArguments {
+    WrongArguments::new(format!("{cell}: [extruder]: {what}"))
+}
+
+/// The inverse of the model that the cell names.
+fn foreseen(
+    keys: &FeedforwardKeys,
+    part: &ExtruderPart,
+    cell: &str,
+    file: &ExtruderFile,
+) -> anyhow::Result<Foreseen> {
+    let model = model::parse(&file.source, &file.text)?;
+    let extruder = &part.extruder;
+    let (unit, flow) = (extruder.drive.unit(), Unit::Mm3PerS);
+    if model.input.unit != unit || model.output.unit != flow {
+        let what = format!(
+            "found a model from {} to {}, expected one from {unit} to {flow}",
+            model.input, model.output
+        );
+        return Err(wrong(cell, &what).into());
+    }
+    let (command, flow_mm3_per_s) = model.operating_point;
+    let settings = InverseSettings {
+        time_constant_s: keys.time_constant_s,
+        right_zeros: keys.right_zeros,
+        known_ahead: Span::ZERO,
+        late: keys.late,
+        limits: extruder.limits.about(command),
+        period: Span::from_secs(1.0 / extruder.rates.feedforward_hz),
+    };
+    let inverse = Inverse::new(&model.transfer, &settings)
+        .map_err(|error| wrong(cell, &error.to_string()))?;
+    Ok(Foreseen::new(inverse, OperatingPoint { command, flow_mm3_per_s }))
+}
+
+/// A profile of commands; one of another quantity, or beyond the limits, is
+/// refused before anything moves.
+fn played(file: &ExtruderFile, part: &ExtruderPart) -> anyhow::Result<Played> {
+    let wrong = |what: String| WrongArguments::new(format!("{}: {what}", file.source));
+    let (profile, quantity) =
+        profile::file::parse(&file.text).map_err(|error| wrong(error.to_string()))?;
+    let unit = part.extruder.drive.unit();
+    if quantity.unit != unit {
+        return Err(wrong(format!(
+            "found {quantity}, expected a quantity in {unit}, the command of [extruder]"
+        ))
+        .into());
+    }
+    let ((low, high), (min, max)) = (profile.range(), part.extruder.limits.range());
+    if low < min || high > max {
+        return Err(wrong(format!(
+            "found commands from {low} to {high} {unit}, expected {min} to {max}, the limits \
+             of [extruder]"
+        ))
+        .into());
+    }
+    Ok(Played::new(profile))
+}
