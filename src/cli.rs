@@ -33,6 +33,7 @@ pub mod check;
 pub mod convert;
 pub mod demo;
 pub mod excite;
+pub mod extruder_sim;
 pub mod identify;
 pub mod models;
 pub mod offset;
@@ -90,6 +91,7 @@ enum Command {
     Simulate(simulate::SimulateArgs),
     Render(render::RenderArgs),
     RobotSim(robot_sim::RobotSimArgs),
+    ExtruderSim(extruder_sim::ExtruderSimArgs),
     Replay(replay::ReplayArgs),
     Reproduce(reproduce::ReproduceArgs),
     Accuracy(accuracy::AccuracyArgs),
@@ -136,6 +138,7 @@ pub fn main() -> ExitCode {
         Command::Simulate(args) => simulate::run(args, voice),
         Command::Render(args) => render::run(args, voice).map(|()| ExitCode::SUCCESS),
         Command::RobotSim(args) => robot_sim::run(args).map(|()| ExitCode::SUCCESS),
+        Command::ExtruderSim(args) => extruder_sim::run(args).map(|()| ExitCode::SUCCESS),
         Command::Reproduce(args) => reproduce::run(args, voice),
         Command::Replay(args) => replay::run(args),
         Command::Accuracy(args) => accuracy::run(args, voice),

@@ -45,8 +45,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     say!("  suffices for process, render");
     match Cell::parse(&args.cell, &loaded.text, Purpose::Run) {
         Ok(cell) => {
-            let with_extruder = cell.run.as_ref().is_some_and(|run| run.extruder.is_some());
-            say!("  suffices for {}", if with_extruder { "simulate" } else { "run, simulate" });
+            say!("  suffices for {}", purposes(cell.run.as_ref()));
             if let Some(run) = &cell.run {
                 about_run(run);
             }
@@ -124,6 +123,17 @@ fn about_surface(loaded: &LoadedCell) {
     }
 }
 
+/// What a cell suffices for that has all that a run needs.
+fn purposes(run: Option<&RunPart>) -> &'static str {
+    let extruder = run.and_then(|run| run.extruder.as_ref());
+    match extruder.map(|part| (part.extruder.link.is_some(), part.plant.is_some())) {
+        None | Some((true, true)) => "run, simulate",
+        Some((true, false)) => "run",
+        Some((false, true)) => "simulate",
+        Some((false, false)) => "neither run nor simulate",
+    }
+}
+
 /// Tells of the extruder side, with all that it refers to.
 fn about_extruder(loaded: &LoadedCell) -> anyhow::Result<()> {
     let part = loaded.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
@@ -134,10 +144,20 @@ fn about_extruder(loaded: &LoadedCell) -> anyhow::Result<()> {
         "  extruder     told {low} to {high} {unit}, {:.1} mm³/s wanted",
         part.demand.nominal().get()
     );
+    let _ = loaded.extruder()?;
     if part.plant.is_some() {
-        let _ = loaded.simulated_extruder()?;
+        let _ = loaded.plant(part)?;
     } else {
         say!("  WARNING      [extruder_plant] is missing: nothing answers in a simulation");
+    }
+    if let Some(link) = &extruder.link {
+        say!(
+            "               reached at {}, a command holds for {} ms",
+            link.address,
+            link.valid_ms
+        );
+    } else {
+        say!("  WARNING      extruder.driver and address are missing: a live run needs them");
     }
     Ok(())
 }

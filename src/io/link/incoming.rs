@@ -60,8 +60,8 @@ impl fmt::Display for Lost {
     }
 }
 
-/// A line and when it arrived.
-type Line<D> = (Stamp, Heard<<D as Dialect>::Hello, <D as Dialect>::State>);
+/// A line of a dialect.
+type LineOf<D> = Heard<<D as Dialect>::Hello, <D as Dialect>::State>;
 
 /// The reading half of a connection.
 pub(super) struct Incoming<D> {
@@ -93,7 +93,7 @@ impl<D: Dialect> Incoming<D> {
     /// none by the deadline. Bytes that wait in the socket at the deadline are
     /// still read once, so that a PC that was late itself does not blame the
     /// other side.
-    pub(super) fn next(&mut self, deadline: Stamp) -> Result<Option<Line<D>>, Why> {
+    pub(super) fn next(&mut self, deadline: Stamp) -> Result<Option<(Stamp, LineOf<D>)>, Why> {
         loop {
             if let Some(piece) = self.pending.pop_front() {
                 if let Some(line) = self.understand(piece)? {
@@ -111,10 +111,7 @@ impl<D: Dialect> Incoming<D> {
         }
     }
 
-    fn understand(
-        &mut self,
-        piece: Result<String, LineFault>,
-    ) -> Result<Option<Heard<D::Hello, D::State>>, Why> {
+    fn understand(&mut self, piece: Result<String, LineFault>) -> Result<Option<LineOf<D>>, Why> {
         let why = match piece {
             Ok(text) => match D::understand(&text) {
                 Ok(line) => {

@@ -12,8 +12,8 @@ use ::mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 
 use super::encode::EncodedFrame;
 use super::format::{
-    EVENT_SCHEMA, EVENT_TOPIC, EventMessage, IMAGE_TOPIC, RUN_METADATA, RunInfo, STEP_SCHEMA,
-    STEP_TOPIC, StepMessage,
+    EVENT_SCHEMA, EVENT_TOPIC, EventMessage, IMAGE_TOPIC, PROFILE_ATTACHMENT, RUN_METADATA,
+    RunInfo, STEP_SCHEMA, STEP_TOPIC, StepMessage,
 };
 use super::{Answered, Counts};
 use crate::io::foxglove;
@@ -97,7 +97,7 @@ impl Mux {
             metadata: run.to_metadata(),
         })?;
         for (name, text) in attachments {
-            let table = name.ends_with(".csv");
+            let table = *name == PROFILE_ATTACHMENT;
             writer.attach(&Attachment {
                 log_time: run.epoch_ns,
                 create_time: run.epoch_ns,

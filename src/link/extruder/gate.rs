@@ -213,9 +213,9 @@ mod tests {
         gate
     }
 
-    fn code(answer: Option<ExtruderLine>) -> Option<ErrCode> {
+    fn code(answer: Option<&ExtruderLine>) -> Option<ErrCode> {
         match answer {
-            Some(ExtruderLine::Err { code, .. }) => Some(code),
+            Some(ExtruderLine::Err { code, .. }) => Some(*code),
             _ => None,
         }
     }
@@ -230,7 +230,10 @@ mod tests {
         assert_eq!(gate.take(at(20), drive(1, RUN, 300, 7010)), None);
         assert_eq!(gate.command(at(309)), RUN);
         assert_eq!(gate.command(at(310)), REST);
-        assert_eq!(code(gate.take(at(320), drive(2, RUN, 300, 7010))), Some(ErrCode::Stale));
+        assert_eq!(
+            code(gate.take(at(320), drive(2, RUN, 300, 7010)).as_ref()),
+            Some(ErrCode::Stale)
+        );
         assert_eq!(gate.take(at(320), drive(3, RUN, 300, 7310)), None);
         assert_eq!(gate.command(at(609)), RUN);
     }
@@ -246,7 +249,7 @@ mod tests {
             (drive(6, RUN, 99, 7010), ErrCode::Range),
             (drive(7, RUN, 300, 7900), ErrCode::Range),
         ] {
-            assert_eq!(code(gate.take(at(30), line)), Some(why), "{line:?}");
+            assert_eq!(code(gate.take(at(30), line).as_ref()), Some(why), "{line:?}");
         }
         assert_eq!(gate.command(at(999)), RUN);
         // At rest no command is too small.
@@ -256,7 +259,7 @@ mod tests {
     #[test]
     fn nothing_is_taken_before_hello_and_each_connection_counts_from_one() {
         let mut gate = gate();
-        assert_eq!(code(gate.take(at(1), drive(1, RUN, 300, 7000))), Some(ErrCode::Form));
+        assert_eq!(code(gate.take(at(1), drive(1, RUN, 300, 7000)).as_ref()), Some(ErrCode::Form));
         let mut gate = greeted();
         assert_eq!(gate.take(at(20), drive(1, RUN, 1000, 7000)), None);
         gate.connect();
@@ -271,7 +274,7 @@ mod tests {
         assert_eq!(gate.take(at(20), drive(1, RUN, 1000, 7000)), None);
         gate.fail();
         assert_eq!(gate.command(at(30)), REST);
-        assert_eq!(code(gate.take(at(30), drive(2, RUN, 300, 7010))), Some(ErrCode::Mode));
+        assert_eq!(code(gate.take(at(30), drive(2, RUN, 300, 7010)).as_ref()), Some(ErrCode::Mode));
         assert_eq!(gate.take(at(30), drive(3, REST, 300, 7010)), None);
         gate.acknowledge();
         assert_eq!(gate.take(at(30), drive(4, RUN, 300, 7010)), None);
