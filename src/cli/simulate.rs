@@ -107,6 +107,7 @@ impl SimRecorder {
             cell_name: loaded.path.display().to_string(),
             cell_text: loaded.text.clone(),
             calibration_text: loaded.calibration_text.clone(),
+            extruder_file: loaded.extruder()?.and_then(|side| side.file),
         };
         let (recorder, _) = record::start(&config, &args.out)?;
         Ok(Self(Some(recorder.waiting())))

@@ -84,14 +84,23 @@ impl Works {
             self.fails_after = None;
             self.gate.fail();
         }
-        self.plant.advance(now);
-        let command = self.gate.command(now);
+        // A command ends where it runs out, however long nobody looked.
+        if let Some(until) = self.gate.runs_out().filter(|&until| until < now) {
+            self.obey(until);
+        }
+        self.obey(now);
+        if self.ran_since.is_none() && self.told.pump_on {
+            self.ran_since = Some(now);
+        }
+    }
+
+    /// Goes on to a moment and does what the gate lets through there.
+    fn obey(&mut self, at: Stamp) {
+        self.plant.advance(at);
+        let command = self.gate.command(at);
         if command != self.told {
             self.told = command;
-            let _ = self.plant.send(now, command);
-        }
-        if self.ran_since.is_none() && command.pump_on {
-            self.ran_since = Some(now);
+            let _ = self.plant.send(at, command);
         }
     }
 }

@@ -2,31 +2,33 @@
 //! for the next step of the extruder side, and lets the runner answer.
 
 mod extruder;
+mod frames;
+mod robot;
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, never, select};
 
-use super::eye::{Look, Seen};
+use super::eye::Seen;
 use super::latency::Latencies;
 use super::scribe::Scribe;
 use crate::control::limiter::Limits;
-use crate::control::{Command, Event, RobotLimits, RobotMode, State, Step};
+use crate::control::{Command, Event, RobotMode, State, Step};
 use crate::io::camera::rendered::RobotView;
 use crate::io::clock::RunClock;
 use crate::io::extruder::{ExtruderClient, ExtruderEvent};
 use crate::io::record::RecorderHandle;
-use crate::io::robot::{LinkClient, RobotEvent, Written};
-use crate::offline::{ControlColumns, FrameRow, Note, names};
-use crate::ports::{RecordError, RobotPort};
+use crate::io::robot::RobotEvent;
+use crate::offline::{Note, names};
+use crate::ports::RecordError;
 use crate::runner::{Handled, Runner};
 use crate::time::{Span, Stamp};
 use crate::units::MmPerS;
-use crate::vision::Reject;
 
 pub use extruder::ExtruderWatch;
+pub use robot::LinkPort;
 
 /// Longest wait for the robot to say that it has stopped.
 const FAREWELL: Span = Span::from_millis(600);
@@ -49,35 +51,6 @@ pub enum Ending {
     /// The extruder takes another quantity than the cell commands, or not all
     /// of what the cell allows.
     ExtruderUnfit(String),
-}
-
-/// The link as the runner's robot, which remembers when it last wrote.
-pub struct LinkPort {
-    client: LinkClient,
-    written: Option<Written>,
-}
-
-impl LinkPort {
-    /// Over a link.
-    pub fn new(client: LinkClient) -> Self {
-        Self { client, written: None }
-    }
-
-    /// Says good-bye.
-    pub fn close(self) {
-        self.client.close();
-    }
-}
-
-impl RobotPort for LinkPort {
-    fn send(&mut self, _now: Stamp, command: Command) -> Option<u64> {
-        self.written = self
-            .client
-            .send(command)
-            .inspect_err(|reason| tracing::debug!(%reason, ?command, "not sent to the robot"))
-            .ok();
-        self.written.map(|written| written.seq)
-    }
 }
 
 /// Where events come from.
@@ -129,9 +102,8 @@ impl Loop<'_> {
             select! {
                 recv(sources.robot) -> message => {
                     let Ok(event) = message else { return };
-                    stopped |= matches!(&event, RobotEvent::State { state, .. }
-                        if matches!(state.mode, RobotMode::Stop | RobotMode::Idle | RobotMode::Fault));
-                    self.robot(event);
+                    stopped |= has_stopped(&event);
+                    self.hear_robot(event);
                 }
                 recv(sources.extruder) -> message => {
                     let Ok(event) = message else { return };
@@ -196,7 +168,9 @@ impl Loop<'_> {
                         seen = none.clone();
                     }
                 },
-                recv(sources.robot) -> message => if let Ok(event) = message { self.robot(event) },
+                recv(sources.robot) -> message => {
+                    if let Ok(event) = message { self.hear_robot(event); }
+                }
                 recv(sources.extruder) -> message => {
                     if let Ok(event) = message { self.hear_extruder(event); }
                 }
@@ -260,89 +234,12 @@ impl Loop<'_> {
             _ => self.latencies.forget(),
         }
     }
-
-    fn look(&mut self, look: Look) {
-        let Look { frame, had_at, outcome, edges } = look;
-        let (seq, captured_at) = (frame.seq, frame.captured_at);
-        let event = match &outcome {
-            Ok(measured) => Event::Measured {
-                frame: seq,
-                captured_at,
-                width_mm: measured.width,
-                sigma_mm: measured.sigma,
-            },
-            Err(reject) => {
-                Event::Rejected { frame: seq, captured_at, reason: reject.status().to_owned() }
-            }
-        };
-        let step = self.give(event).step;
-        if step.trace.demand_mm_per_s.is_some() {
-            self.latencies.used(had_at, self.clock.now());
-        }
-        let row = FrameRow {
-            frame: seq,
-            time_s: Some(captured_at.secs()),
-            outcome: outcome.map_err(|reject| reject.status()),
-            control: Some(self.columns(&step)),
-        };
-        self.scribe.frame(row, Some((frame, edges.0, edges.1)));
-    }
-
-    fn unreadable(&mut self, seq: u64, at: Stamp, reason: &str) {
-        tracing::warn!("frame {seq} is unreadable: {reason}");
-        let status = Reject::Unreadable.status();
-        let event = Event::Rejected { frame: seq, captured_at: at, reason: status.to_owned() };
-        let step = self.give(event).step;
-        let control = Some(self.columns(&step));
-        let row = FrameRow { frame: seq, time_s: Some(at.secs()), outcome: Err(status), control };
-        self.scribe.frame(row, None);
-    }
-
-    fn columns(&self, step: &Step) -> ControlColumns {
-        ControlColumns {
-            bead_path: step.trace.bead_path_mm,
-            bead_expected: step.trace.bead_expected,
-            nozzle_path: step.trace.nozzle_path_mm,
-            speed: self.speed,
-            setpoint: self.setpoint,
-            state: step.state.name(),
-            limit: step.trace.limit,
-        }
-    }
-
-    fn robot(&mut self, event: RobotEvent) {
-        match &event {
-            RobotEvent::State { at, state } => {
-                self.robot_z.store(state.z_mm.get().to_bits(), Ordering::Relaxed);
-                self.speed = Some(state.speed_mm_per_s);
-                if let Some(view) = &self.robot_view {
-                    view.observe(*at, state);
-                }
-            }
-            RobotEvent::Up { hello: robot, .. } => {
-                (self.notice)(&format!("robot `{}` is connected", robot.name));
-                self.unfit = unfit(&self.limits, robot).map(Ending::RobotLimits);
-            }
-            RobotEvent::Down { reason, .. } => (self.notice)(&format!("robot: {reason}")),
-            RobotEvent::Refused { seq, code, text, .. } => {
-                (self.notice)(&format!("robot refused line {seq}: {} {text}", code.word()));
-            }
-        }
-        let (_, event) = event.into_event();
-        self.give(event);
-    }
 }
 
-/// Why a robot cannot be driven with a cell's limits, if it cannot.
-fn unfit(limits: &Limits, robot: &RobotLimits) -> Option<String> {
-    let fits = robot.min_mm_per_s <= limits.min_speed && limits.max_speed <= robot.max_mm_per_s;
-    (!fits).then(|| {
-        format!(
-            "robot `{}` takes {} to {}, the cell's [limits] are {} to {}; make them lie within \
-             the robot's",
-            robot.name, robot.min_mm_per_s, robot.max_mm_per_s, limits.min_speed, limits.max_speed
-        )
-    })
+/// Whether the robot says that it lays nothing any more.
+fn has_stopped(event: &RobotEvent) -> bool {
+    let RobotEvent::State { state, .. } = event else { return false };
+    matches!(state.mode, RobotMode::Stop | RobotMode::Idle | RobotMode::Fault)
 }
 
 fn duration(span: Span) -> Duration {

@@ -87,6 +87,11 @@ impl Gate {
         self.faults = faults;
     }
 
+    /// When the running command is void, where there is one.
+    pub fn runs_out(&self) -> Option<Stamp> {
+        self.command.map(|(_, until)| until)
+    }
+
     /// What pump and valve are to do now: the last command while it is valid,
     /// and nothing otherwise.
     pub fn command(&mut self, now: Stamp) -> ExtruderCommand {
