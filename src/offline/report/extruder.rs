@@ -22,6 +22,7 @@ use crate::units::Mm3PerS;
 pub struct ExtruderCharts {
     wanted: Series,
     flow: Series,
+    sensed_flow: Series,
     command: Series,
     feedforward: Series,
     screw: Series,
@@ -68,6 +69,7 @@ impl ExtruderCharts {
             }
         };
         push(&mut self.screw, report.screw_rpm.map(f64::from));
+        push(&mut self.sensed_flow, report.flow_mm3_per_s.map(f64::from));
         push(&mut self.pressure, report.pressure_mpa.map(f64::from));
         push(&mut self.filled, report.filled_mm.map(f64::from));
     }
@@ -102,18 +104,28 @@ impl ExtruderCharts {
     }
 
     fn flow_plot(&self, axis: &XAxis) -> Markup {
+        // A live run knows what a sensor tells, if there is one.
+        let (flow, name) = if self.flow.is_empty() {
+            (&self.sensed_flow, "measured")
+        } else {
+            (&self.flow, "at the nozzle")
+        };
         let plot = Plot {
             area: Area::wide(240.0),
             x: axis,
             y_title: "flow [mm³/s]",
-            y_range: y_range(&[&self.wanted, &self.flow], &[0.0]),
+            y_range: y_range(&[&self.wanted, flow], &[0.0]),
             layers: vec![
                 Layer::Wish(&self.wanted, palette::TARGET),
-                Layer::Curve(&self.flow, palette::FLOW),
+                Layer::Curve(flow, palette::FLOW),
             ],
         };
+        let mut entries = vec![("wanted", palette::TARGET, "dash")];
+        if !flow.is_empty() {
+            entries.push((name, palette::FLOW, ""));
+        }
         html! {
-            (legend(&[("wanted", palette::TARGET, "dash"), ("at the nozzle", palette::FLOW, "")]))
+            (legend(&entries))
             (plot.draw())
         }
     }

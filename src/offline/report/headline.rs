@@ -207,7 +207,7 @@ pub fn tiles(summary: &Summary) -> Markup {
                     (tile("latency, 99 %", &number(control.latency_ms.p99, 2), "ms",
                         &format!("median {}, longest {}", number(control.latency_ms.p50, 2), number(control.latency_ms.max, 2))))
                 }
-                @if let Some(extruder) = &summary.extruder {
+                @if let Some(extruder) = &summary.extruder && extruder.flow_mean_mm3_per_s.is_some() {
                     (tile("flow", &number(extruder.flow_mean_mm3_per_s, 0), "mm³/s",
                         &format!("{} mm³/s RMS from what was wanted", number(extruder.flow_error_rms_mm3_per_s, 0))))
                 }
