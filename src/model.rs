@@ -22,4 +22,5 @@ pub use discrete::{DiscreteTransfer, Method, Recursion};
 pub use margins::{Margins, margins};
 pub use process::{FirstOrder, SecondOrder};
 pub use simulate::{Between, Simulator, simulate};
+pub use state::{Advance, StateSpace};
 pub use transfer::{ModelError, TransferFunction};

@@ -8,6 +8,7 @@
 //!   area or pressure ─▶ unmodelled flow ┴─▶ ÷ area   observer::FlowObserver
 //!                                 └─▶ speed ─GC─▶ drive of wheel or robot
 //! demanded flow ─(G1·G2)⁻¹─▶ command                 inverse::Inverse
+//!                     the same within limits             tracker::Tracker
 //! ```
 //!
 //! Everything runs on the fixed grid of the commands, 200 Hz in the thesis.
@@ -18,11 +19,13 @@ mod inverse;
 mod observer;
 #[cfg(test)]
 mod tests;
+mod tracker;
 
 pub use follow::{FlowSeen, Followed, SpeedFeedforward};
 pub use forecast::{ExtruderModel, FlowForecast, ScrewSpeed};
 pub use inverse::{Inverse, InverseSettings, RightZeros};
 pub use observer::{FlowObserver, FlowResidual, UnmodelledFlow, share_left};
+pub use tracker::Tracker;
 
 use super::limits::LimitError;
 use crate::model::{ModelError, TransferFunction};
@@ -61,6 +64,19 @@ pub enum FeedforwardError {
         re: f64,
         /// Size of the imaginary part \[1/s\].
         im: f64,
+    },
+    /// Poles that commands so rare cannot place.
+    #[error(
+        "the placed poles' time constant is {time_constant_s} s, which commands every {period_s} s \
+         cannot follow: at least {least_s} s, or command more often"
+    )]
+    TooQuick {
+        /// What was asked for \[s\].
+        time_constant_s: f64,
+        /// Time between two commands \[s\].
+        period_s: f64,
+        /// What can be had \[s\].
+        least_s: f64,
     },
     /// The output would be later than it may be.
     #[error(

@@ -117,7 +117,7 @@ pub enum Law {
     /// The inverse of a model.
     Feedforward(Foreseen),
     /// The pressure at the nozzle.
-    Pressure(PressureLoop),
+    Pressure(Box<PressureLoop>),
     /// The filled length of a screw, foretold over its delay.
     Screw(ScrewFill),
     /// Model-reference adaptive control of the speed in the nozzle.
@@ -131,7 +131,7 @@ impl Law {
             Self::Constant(law) => law,
             Self::Profile(law) => law,
             Self::Feedforward(law) => law,
-            Self::Pressure(law) => law,
+            Self::Pressure(law) => law.as_ref(),
             Self::Screw(law) => law,
             Self::Adaptive(law) => law,
         }
@@ -143,7 +143,7 @@ impl Law {
             Self::Constant(law) => law,
             Self::Profile(law) => law,
             Self::Feedforward(law) => law,
-            Self::Pressure(law) => law,
+            Self::Pressure(law) => law.as_mut(),
             Self::Screw(law) => law,
             Self::Adaptive(law) => law,
         }

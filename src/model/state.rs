@@ -9,22 +9,31 @@ use super::transfer::{ModelError, TransferFunction};
 /// x' = A·x + B·u, y = C·x + D·u: the controllable form in units of the poles'
 /// mean size, so that its matrices stay of order one.
 #[derive(Debug, Clone)]
-pub(super) struct StateSpace {
+pub struct StateSpace {
+    /// A \[1/s\].
     pub a: DMatrix<f64>,
+    /// B \[1/s\].
     pub b: DVector<f64>,
+    /// C, as a column.
     pub c: DVector<f64>,
+    /// D.
     pub d: f64,
 }
 
 /// How a state moves on over a time h: x(h) = Φ·x(0) + constant·u(0) +
 /// slope·u'(0) with an input that is a straight line.
-pub(super) struct Advance {
+#[derive(Debug, Clone)]
+pub struct Advance {
+    /// Φ.
     pub state: DMatrix<f64>,
+    /// What an input of one adds that stands.
     pub constant: DVector<f64>,
+    /// What an input adds that grows by one each second.
     pub slope: DVector<f64>,
 }
 
 impl StateSpace {
+    /// Of a transfer function without its dead time.
     pub fn of(tf: &TransferFunction) -> Self {
         let order = tf.order();
         let (num, den) = (tf.num(), tf.den());

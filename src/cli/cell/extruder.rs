@@ -6,7 +6,7 @@ use std::fs;
 use crate::cli::WrongArguments;
 use crate::config::cell::ExtruderPart;
 use crate::config::extruder::{FeedforwardKeys, ModelSource, Strategy};
-use crate::extruder::feedforward::{Inverse, InverseSettings};
+use crate::extruder::feedforward::{InverseSettings, Tracker};
 use crate::extruder::law::{
     AdaptiveNozzle, Constant, Foreseen, OperatingPoint, Played, PressureLoop, ScrewFill,
 };
@@ -68,7 +68,7 @@ pub fn setup(
         Strategy::Constant { value } => Law::Constant(Constant(*value)),
         Strategy::Profile { .. } => Law::Profile(played(needed()?, part)?),
         Strategy::Feedforward(keys) => Law::Feedforward(foreseen(keys, part, cell, needed()?)?),
-        Strategy::Pressure(settings) => Law::Pressure(PressureLoop::new(**settings)),
+        Strategy::Pressure(settings) => Law::Pressure(Box::new(PressureLoop::new(**settings))),
         Strategy::Screw(settings) => Law::Screw(ScrewFill::new(settings)?),
         Strategy::Adaptive(parts) => Law::Adaptive(AdaptiveNozzle::new(parts.0, parts.1)),
     };
@@ -105,9 +105,9 @@ fn foreseen(
         limits: extruder.limits.about(command),
         period: Span::from_secs(1.0 / extruder.rates.feedforward_hz),
     };
-    let inverse = Inverse::new(&model.transfer, &settings)
+    let tracker = Tracker::new(&model.transfer, &settings)
         .map_err(|error| wrong(cell, &error.to_string()))?;
-    Ok(Foreseen::new(inverse, OperatingPoint { command, flow_mm3_per_s }))
+    Ok(Foreseen::new(tracker, OperatingPoint { command, flow_mm3_per_s }))
 }
 
 /// A profile of commands; one of another quantity, or beyond the limits, is

@@ -151,7 +151,7 @@ impl Inverse {
 
 /// The model without dead time and with its zeros in the left half plane, and
 /// by how much mirroring makes it late \[s\].
-fn minimum_phase(
+pub(super) fn minimum_phase(
     model: &TransferFunction,
     rule: RightZeros,
 ) -> Result<(TransferFunction, f64), FeedforwardError> {

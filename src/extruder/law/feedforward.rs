@@ -2,8 +2,7 @@
 //! becomes the command that gives it. bcs-thesis, chapter 4.
 
 use super::{Strategy, Unusable, Wish};
-use crate::extruder::feedforward::Inverse;
-use crate::extruder::limits::CommandLimit;
+use crate::extruder::feedforward::Tracker;
 use crate::extruder::report::ExtruderReport;
 use crate::time::{Span, Stamp};
 use crate::units::Mm3PerS;
@@ -21,39 +20,41 @@ pub struct OperatingPoint {
 /// feedforward, for which it was made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Foreseen {
-    inverse: Inverse,
+    tracker: Tracker,
     about: OperatingPoint,
-    wanted: Mm3PerS,
+    applied: f64,
     command: f64,
 }
 
 impl Foreseen {
-    /// Before its first bead. The inverse takes and gives differences from the
-    /// operating point, its limits included.
-    pub const fn new(inverse: Inverse, about: OperatingPoint) -> Self {
-        Self { inverse, about, wanted: Mm3PerS::ZERO, command: 0.0 }
+    /// Before its first bead. The tracker takes and gives differences from the
+    /// operating point.
+    pub const fn new(tracker: Tracker, about: OperatingPoint) -> Self {
+        Self { tracker, about, applied: 0.0, command: 0.0 }
     }
 
-    fn off(&self, flow: Mm3PerS) -> f64 {
-        flow.get() - self.about.flow_mm3_per_s
+    fn aim(&mut self, flow: Mm3PerS) {
+        let off = flow.get() - self.about.flow_mm3_per_s;
+        self.command = self.about.command + self.tracker.command(off);
     }
 }
 
 impl Strategy for Foreseen {
     fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> Wish {
-        self.wanted = flow;
-        let off = self.off(flow);
-        let command = off / self.inverse.gain();
-        // Only a model that integrates has no steady state, and such a one has
-        // no gain and was refused.
-        let _ = self.inverse.start(off, command);
-        self.command = self.about.command + command;
+        // The pump stands, and nothing flows.
+        self.applied = 0.0;
+        self.tracker.start(-self.about.command);
+        self.aim(flow);
         self.wish()
     }
 
-    fn foresee(&mut self, _dt: Span, flow: Mm3PerS) {
-        self.wanted = flow;
-        self.command = self.about.command + self.inverse.step(self.off(flow));
+    fn foresee(&mut self, dt: Span, flow: Mm3PerS) {
+        self.wait(dt);
+        self.aim(flow);
+    }
+
+    fn wait(&mut self, _dt: Span) {
+        self.tracker.pass(self.applied - self.about.command);
     }
 
     fn answer(&mut self, _now: Stamp, _dt: Span, _report: &ExtruderReport) -> Result<(), Unusable> {
@@ -64,17 +65,11 @@ impl Strategy for Foreseen {
         Wish::known(self.command)
     }
 
-    fn resume(&mut self, _now: Stamp, applied: f64) {
-        let _ = self.inverse.start(self.off(self.wanted), applied - self.about.command);
-        self.command = applied;
-    }
-
-    fn limit(&self) -> CommandLimit {
-        self.inverse.limit()
-    }
+    // The tracker knows the way from where a command that was kept has led.
+    fn resume(&mut self, _now: Stamp, _applied: f64) {}
 
     fn settle(&mut self, _now: Stamp, applied: f64) {
-        self.inverse.settle(applied - self.about.command);
+        self.applied = applied;
     }
 }
 
@@ -85,31 +80,121 @@ mod tests {
     use crate::extruder::feedforward::{InverseSettings, RightZeros};
     use crate::model::{Between, Simulator, TransferFunction};
 
-    #[test]
-    fn a_step_of_the_wanted_flow_is_reached_with_the_placed_pole() {
-        let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
-        let period = Span::from_millis(5);
+    const PERIOD: Span = Span::from_millis(5);
+
+    fn law(
+        model: &TransferFunction,
+        limits: CommandLimits,
+        about: OperatingPoint,
+        time_constant_s: f64,
+    ) -> Foreseen {
         let settings = InverseSettings {
-            time_constant_s: 0.1,
+            time_constant_s,
             right_zeros: RightZeros::Refuse,
             known_ahead: Span::ZERO,
             late: Span::ZERO,
-            limits: CommandLimits::new(-200.0, 200.0, 1e6).unwrap(),
-            period,
+            limits,
+            period: PERIOD,
         };
-        let inverse = Inverse::new(&model, &settings).unwrap();
-        let about = OperatingPoint { command: 30.0, flow_mm3_per_s: 400.0 };
-        let mut law = Foreseen::new(inverse, about);
-        assert!((law.begin(Stamp::START, Mm3PerS::constant(400.0)).value - 30.0).abs() < 1e-12);
-        let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
-        let mut flow = 0.0;
-        for _ in 0..20 {
-            law.foresee(period, Mm3PerS::constant(460.0));
-            flow = 400.0 + plant.step(law.wish().value - 30.0);
-            law.settle(Stamp::START, law.wish().value);
+        Foreseen::new(Tracker::new(model, &settings).unwrap(), about)
+    }
+
+    /// Shares of a wanted flow over time, and the commands.
+    fn course(
+        law: &mut Foreseen,
+        plant: &mut Simulator,
+        flow: f64,
+        limits: CommandLimits,
+    ) -> Vec<f64> {
+        let wanted = Mm3PerS::constant(flow);
+        let mut told = limits.apply(law.begin(Stamp::START, wanted).value, 0.0, PERIOD).0;
+        law.settle(Stamp::START, told);
+        let mut course = vec![plant.step(told) / flow];
+        for _ in 0..1000 {
+            law.foresee(PERIOD, wanted);
+            told = limits.apply(law.wish().value, told, PERIOD).0;
+            law.settle(Stamp::START, told);
+            course.push(plant.step(told) / flow);
         }
-        // One time constant after the step, less the half period of the hold.
-        let reached = (flow - 400.0) / 60.0;
-        assert!((reached - 0.62).abs() < 0.02, "{reached}");
+        course
+    }
+
+    #[test]
+    fn without_limits_the_flow_comes_with_the_placed_poles() {
+        for (num, den, poles) in [
+            (vec![12.0], vec![0.84, 1.0], 1),
+            (vec![18.0], vec![0.656, 0.975, 1.0], 2),
+            (vec![9.175, 149.2, 905.3], vec![1.0, 12.84, 47.52], 0),
+            (vec![2.0, 10.0], vec![0.1, 0.8, 1.7, 1.0], 2),
+        ] {
+            let model = TransferFunction::new(&num, &den, 0.0).unwrap();
+            let limits = CommandLimits::new(-1e6, 1e6, 1e12).unwrap();
+            let mut law = law(&model, limits, OperatingPoint::default(), 0.1);
+            let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
+            let course = course(&mut law, &mut plant, 500.0, limits);
+            for (k, share) in (0_u32..).zip(&course).skip(20) {
+                let x = f64::from(k) * 0.005 / 0.1;
+                let expected = match poles {
+                    0 => 1.0,
+                    1 => 1.0 - f64::exp(-x),
+                    _ => 1.0 - (1.0 + x) * f64::exp(-x),
+                };
+                assert!((share - expected).abs() < 0.04, "{num:?} {k}: {share} {expected}");
+            }
+            assert!((course[1000] - 1.0).abs() < 1e-6, "{num:?}");
+        }
+    }
+
+    #[test]
+    fn an_extruder_that_stood_is_brought_to_its_flow_within_its_limits() {
+        let model = TransferFunction::new(&[18.0], &[0.656, 0.975, 1.0], 0.0).unwrap();
+        let limits = CommandLimits::new(0.0, 60.0, 400.0).unwrap();
+        let mut law = law(&model, limits, OperatingPoint::default(), 0.25);
+        let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
+        let course = course(&mut law, &mut plant, 540.0, limits);
+        let settled =
+            |course: &[f64]| course.iter().rposition(|share| (share - 1.0).abs() > 0.05).unwrap();
+        let mut steady = Simulator::new(&model, 0.005, Between::Held).unwrap();
+        let alone: Vec<f64> = (0..2000).map(|_| steady.step(30.0) / 540.0).collect();
+        let (with, without) = (settled(&course), settled(&alone));
+        assert!(2 * with < without, "{with} {without}");
+        let most = course.iter().fold(0.0_f64, |most, share| most.max(*share));
+        assert!(most < 1.03, "{most}");
+    }
+
+    #[test]
+    fn poles_that_are_quicker_than_the_commands_are_refused() {
+        let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
+        let with = |time_constant_s| {
+            Tracker::new(
+                &model,
+                &InverseSettings {
+                    time_constant_s,
+                    right_zeros: RightZeros::Refuse,
+                    known_ahead: Span::ZERO,
+                    late: Span::ZERO,
+                    limits: CommandLimits::new(0.0, 90.0, 1e6).unwrap(),
+                    period: PERIOD,
+                },
+            )
+        };
+        assert!(with(0.02).is_ok());
+        let error = with(0.019).unwrap_err().to_string();
+        assert!(error.contains("at least 0.02 s"), "{error}");
+    }
+
+    #[test]
+    fn a_model_about_another_point_is_followed_from_there() {
+        let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
+        let about = OperatingPoint { command: 30.0, flow_mm3_per_s: 400.0 };
+        let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
+        let mut law = law(&model, limits, about, 0.1);
+        let mut told = law.begin(Stamp::START, Mm3PerS::constant(460.0)).value;
+        for _ in 0..2000 {
+            law.settle(Stamp::START, told.clamp(0.0, 90.0));
+            law.foresee(PERIOD, Mm3PerS::constant(460.0));
+            told = law.wish().value;
+        }
+        assert!((told - 35.0).abs() < 1e-9, "{told}");
     }
 }

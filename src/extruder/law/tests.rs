@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::extruder::adaptive::{Adaptation, FirstOrder, Gains, Law as AdaptiveLaw, Safety};
-use crate::extruder::feedforward::{Inverse, InverseSettings, RightZeros};
+use crate::extruder::feedforward::{InverseSettings, RightZeros, Tracker};
 use crate::extruder::limits::CommandLimits;
 use crate::extruder::pressure::kalman::Noise;
 use crate::extruder::pressure::pi::PiGains;
@@ -132,7 +132,7 @@ fn pressed(choice: fn(&Fopdt, Noise) -> PressureChoice) -> (Supervisor, Pressed)
         nozzle: PowerLaw::PP_GF28,
         limits,
     };
-    let side = supervisor(Drive::Rpm, Law::Pressure(PressureLoop::new(settings)), limits);
+    let side = supervisor(Drive::Rpm, Law::Pressure(Box::new(PressureLoop::new(settings))), limits);
     let rest = Running { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO };
     let disturbed = Disturbed { noise_mpa2: 1e-6, seed: 7, ..Disturbed::default() };
     (side, Pressed(Plant::new(process, disturbed, Rpm::constant(90.0), rest)))
@@ -232,7 +232,7 @@ fn foreseen() -> (Supervisor, Box<dyn Machine>) {
         limits,
         period: TICK,
     };
-    let law = Foreseen::new(Inverse::new(&model, &settings).unwrap(), OperatingPoint::default());
+    let law = Foreseen::new(Tracker::new(&model, &settings).unwrap(), OperatingPoint::default());
     let side = supervisor(Drive::Rpm, Law::Feedforward(law), limits);
     (side, Box::new(Lagging::new(12.0, 0.84)))
 }
