@@ -28,6 +28,10 @@ use crate::units::{Mm, MmPerS};
 /// Share of the setpoint at which a robot that starts has run up.
 const RUN_UP: f64 = 0.95;
 
+/// Least share of its speed from which the speed of a robot that goes by the
+/// flow is taken for the law's: below, the robot's limits say more of it.
+const LEAST_SHARE: f64 = 0.5;
+
 /// Everything the controller has to know of its cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setup {
@@ -177,6 +181,12 @@ impl Controller {
         }
     }
 
+    /// Share of the width controller's speed that the flow at the nozzle
+    /// allows; 1 where the robot does not go by it.
+    fn flow_share(&self) -> f64 {
+        self.extruder.as_ref().map_or(1.0, |side| side.supervisor.robot_share())
+    }
+
     fn extruder_fault(&self) -> Option<ExtruderFault> {
         match self.extruder.as_ref()?.supervisor.state() {
             ExtruderState::Fault(why) => Some(why),
@@ -278,7 +288,10 @@ impl Controller {
 
     fn start_tracking(&mut self, captured_at: Stamp, error: Mm, trace: &mut Trace) {
         let driven = self.robot.map_or(self.setup.start_speed, |robot| robot.speed_mm_per_s);
-        let mut pi = Pi::start_bumpless(self.setup.control.gains, driven, error);
+        // A robot that goes by the flow is slower or faster than the law says.
+        let share = self.flow_share().max(LEAST_SHARE);
+        let own = driven * (1.0 / share);
+        let mut pi = Pi::start_bumpless(self.setup.control.gains, own, error);
         let demand = pi.step(error, Span::ZERO, Saturation::None);
         trace.note(&demand);
         self.told = self.told.map(|(at, _)| (at, driven));
@@ -325,6 +338,11 @@ impl Controller {
             Phase::Priming => self.setup.start_speed,
             Phase::Tracking { demand, .. } => *demand,
             Phase::Holding { .. } => self.told.map_or(self.setup.start_speed, |(_, speed)| speed),
+        };
+        // A hold keeps the speed as it is, whatever flows.
+        let speed = match self.phase {
+            Phase::Holding { .. } => speed,
+            _ => speed * self.flow_share(),
         };
         trace.demand_mm_per_s = Some(speed);
         let (last_at, last) = self.told.unwrap_or((now, speed));

@@ -22,7 +22,7 @@ pub mod screw;
 pub mod state;
 pub mod supervisor;
 
-pub use demand::{FlowDemand, Follows};
+pub use demand::{FlowDemand, Follows, RobotFollows};
 pub use drive::Drive;
 pub use law::Law;
 pub use limits::{CommandLimit, CommandLimits};

@@ -73,11 +73,11 @@ impl LoadedCell {
     /// The extruder side as the controller has it; none where the cell has
     /// none. Reads the file that the cell names for it.
     pub fn extruder(&self) -> anyhow::Result<Option<ExtruderSide>> {
-        let part = self.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
-        let Some(part) = part else { return Ok(None) };
+        let Some(run) = &self.cell.run else { return Ok(None) };
+        let Some(part) = &run.extruder else { return Ok(None) };
         let cell = self.path.display().to_string();
         let file = extruder::file(part, &cell)?;
-        let setup = extruder::setup(part, &cell, file.as_ref())?;
+        let setup = extruder::setup(run, part, &cell, file.as_ref())?;
         Ok(Some(ExtruderSide { setup, file }))
     }
 

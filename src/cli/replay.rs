@@ -71,7 +71,7 @@ fn recorded_controller(recording: &Recording) -> anyhow::Result<Controller> {
     let Some(part) = &run.extruder else { return Ok(controller) };
     let file = recorded_file(recording, part)?;
     let cell = format!("cell.toml in {}", recording.file());
-    let setup = extruder::setup(part, &cell, file.as_ref())?;
+    let setup = extruder::setup(&run, part, &cell, file.as_ref())?;
     Ok(controller.with_extruder(setup, part.demand))
 }
 

@@ -17,7 +17,9 @@ pub use strategy::{FeedforwardKeys, ModelSource, Strategy};
 
 use super::table::Table;
 use crate::extruder::demand::section;
-use crate::extruder::{CommandLimits, Drive, ExtruderSetup, FlowDemand, Follows, Law};
+use crate::extruder::{
+    CommandLimits, Drive, ExtruderSetup, FlowDemand, Follows, Law, RobotFollows,
+};
 use crate::time::Span;
 use crate::units::{MPa, Mm, MmPerS};
 
@@ -37,6 +39,8 @@ pub struct Extruder {
     pub layer_height: Mm,
     /// What the flow goes by.
     pub follows: Follows,
+    /// What the robot's speed goes by besides the width.
+    pub robot_follows: RobotFollows,
     /// How often what is done.
     pub rates: Rates,
     /// Longest time without a report over which the strategy goes on.
@@ -103,8 +107,17 @@ impl Extruder {
             Strategy::read(table, &about)
         });
         let height = table.number("layer_height_mm", 1e-3..=1e4);
-        let follows = table
-            .choice("follows", &[("robot", Follows::Robot), ("start_speed", Follows::StartSpeed)]);
+        let robot_follows = table.choice(
+            "robot_follows",
+            &[("nothing", RobotFollows::Nothing), ("flow", RobotFollows::Flow)],
+        );
+        let follows = read_follows(table, robot_follows);
+        if robot_follows == Some(RobotFollows::Flow)
+            && strategy.as_ref().is_some_and(|known| !matches!(known, Strategy::Feedforward(_)))
+        {
+            let expected = "strategy = \"feedforward\", whose model foretells the flow";
+            table.report("robot_follows", "\"flow\"", expected);
+        }
         let max_gap = table.number("max_gap_s", 0.01..=60.0);
         let max_hold = table.number("max_hold_s", 0.1..=3600.0);
         let max_pressure = table.optional_number("max_pressure_mpa", 1e-6..=1e4);
@@ -115,6 +128,7 @@ impl Extruder {
             strategy: strategy?,
             layer_height: Mm::new(height?).ok()?,
             follows: follows?,
+            robot_follows: robot_follows?,
             rates: rates?,
             max_gap: Span::from_secs(max_gap?),
             max_hold: Span::from_secs(max_hold?),
@@ -149,6 +163,7 @@ impl Extruder {
             max_gap: self.max_gap,
             max_hold: self.max_hold,
             max_pressure: self.max_pressure,
+            robot_follows: self.robot_follows,
         }
     }
 }
@@ -159,6 +174,24 @@ struct About<'a> {
     drive: Drive,
     limits: Option<CommandLimits>,
     rates: Rates,
+}
+
+/// A flow that follows the robot, and a robot that follows the flow, would lead
+/// each other to a stand.
+fn read_follows(table: &Table<'_>, robot_follows: Option<RobotFollows>) -> Option<Follows> {
+    let words = [("robot", Follows::Robot), ("start_speed", Follows::StartSpeed)];
+    if robot_follows != Some(RobotFollows::Flow) {
+        return table.choice("follows", &words);
+    }
+    if !table.has("follows") {
+        return Some(Follows::StartSpeed);
+    }
+    let follows = table.choice("follows", &words);
+    if follows == Some(Follows::Robot) {
+        let expected = "\"start_speed\": with robot_follows = \"flow\" the robot goes by the flow";
+        table.report("follows", "\"robot\"", expected);
+    }
+    follows
 }
 
 fn read_limits(table: &Table<'_>, drive: Drive) -> Option<CommandLimits> {

@@ -21,6 +21,17 @@ pub enum Follows {
     Robot,
 }
 
+/// What the robot's speed goes by, besides the width that is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RobotFollows {
+    /// Nothing else.
+    Nothing,
+    /// The flow that the extruder's model foretells: where there is half the
+    /// flow that is wanted, the robot moves at half its speed, within its limits.
+    /// bcs-thesis, figure 33.
+    Flow,
+}
+
 /// The flow of a bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlowDemand {

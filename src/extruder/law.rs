@@ -8,7 +8,7 @@ mod pressure;
 mod screw;
 
 pub use adaptive::{AdaptiveNozzle, NozzleModel};
-pub use feedforward::{Foreseen, OperatingPoint};
+pub use feedforward::{DrivenBy, Foreseen, OperatingPoint};
 pub use played::{Constant, Played};
 pub use pressure::{PressureChoice, PressureLoop, PressureSettings};
 pub use screw::ScrewFill;
@@ -27,6 +27,8 @@ pub enum Need {
     Filled,
     /// The flow through the nozzle.
     Flow,
+    /// The speed of the screw.
+    Screw,
 }
 
 impl Need {
@@ -36,6 +38,7 @@ impl Need {
             Self::Pressure => report.pressure_mpa.is_some(),
             Self::Filled => report.filled_mm.is_some(),
             Self::Flow => report.flow_mm3_per_s.is_some(),
+            Self::Screw => report.screw_rpm.is_some(),
         }
     }
 }
@@ -94,6 +97,12 @@ pub trait Strategy {
     /// that time.
     fn resume(&mut self, now: Stamp, applied: f64);
 
+    /// The flow that will leave the nozzle, for a robot that goes by it; none
+    /// where the law knows none.
+    fn foretold(&self) -> Option<Mm3PerS> {
+        None
+    }
+
     /// The limit that shaped the wish already.
     fn limit(&self) -> CommandLimit {
         CommandLimit::None
@@ -115,7 +124,7 @@ pub enum Law {
     /// Commands that were written down beforehand, for an experiment.
     Profile(Played),
     /// The inverse of a model.
-    Feedforward(Foreseen),
+    Feedforward(Box<Foreseen>),
     /// The pressure at the nozzle.
     Pressure(Box<PressureLoop>),
     /// The filled length of a screw, foretold over its delay.
@@ -130,7 +139,7 @@ impl Law {
         match self {
             Self::Constant(law) => law,
             Self::Profile(law) => law,
-            Self::Feedforward(law) => law,
+            Self::Feedforward(law) => law.as_ref(),
             Self::Pressure(law) => law.as_ref(),
             Self::Screw(law) => law,
             Self::Adaptive(law) => law,
@@ -142,7 +151,7 @@ impl Law {
         match self {
             Self::Constant(law) => law,
             Self::Profile(law) => law,
-            Self::Feedforward(law) => law,
+            Self::Feedforward(law) => law.as_mut(),
             Self::Pressure(law) => law.as_mut(),
             Self::Screw(law) => law,
             Self::Adaptive(law) => law,

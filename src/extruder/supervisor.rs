@@ -9,15 +9,18 @@
 //!   goes, and a fault when it stays too long.
 //! - fault: the pump is stopped; left when the robot is idle again.
 
-use super::Drive;
 use super::law::{Law, Need, Wish};
 use super::limits::{CommandLimit, CommandLimits};
 use super::rates::Rate;
 use super::report::{ExtruderCommand, ExtruderReport, PumpMode};
 use super::state::{ExtruderFault, ExtruderHold, ExtruderState, ExtruderTrace};
+use super::{Drive, RobotFollows};
 use crate::control::follow::{Follow, Verdict};
 use crate::time::{Span, Stamp};
 use crate::units::{MPa, Mm3PerS};
+
+/// Most by which a robot that follows the flow is quickened.
+const MOST_SHARE: f64 = 1.5;
 
 /// Everything the extruder side has to know of its cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +43,8 @@ pub struct ExtruderSetup {
     pub max_hold: Span,
     /// Pressure at which the pump is stopped, if there is one.
     pub max_pressure: Option<MPa>,
+    /// What the robot's speed goes by besides the width.
+    pub robot_follows: RobotFollows,
 }
 
 /// What the robot's side says at a tick.
@@ -122,6 +127,19 @@ impl Supervisor {
     /// The numbers behind the last command.
     pub const fn trace(&self) -> ExtruderTrace {
         self.trace
+    }
+
+    /// Share of its speed at which a robot that follows the flow is to move:
+    /// the flow that is foretold over the one that is wanted; 1 where the robot
+    /// does not follow, or nothing is known of the flow.
+    pub fn robot_share(&self) -> f64 {
+        let wanted = self.trace.flow_mm3_per_s;
+        match (self.setup.robot_follows, self.trace.foretold_mm3_per_s) {
+            (RobotFollows::Flow, Some(foretold)) if wanted > Mm3PerS::ZERO => {
+                (foretold / wanted).clamp(0.0, MOST_SHARE)
+            }
+            _ => 1.0,
+        }
     }
 
     /// The link to the extruder came up.
@@ -223,6 +241,7 @@ impl Supervisor {
             }
             Phase::Off | Phase::Starting { .. } | Phase::Fault(_) => {}
         }
+        self.trace.foretold_mm3_per_s = self.setup.law.strategy().foretold();
     }
 
     /// Stands where the law begins. The first command of a bead is no change

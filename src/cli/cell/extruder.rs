@@ -4,9 +4,11 @@
 use std::fs;
 
 use crate::cli::WrongArguments;
-use crate::config::cell::ExtruderPart;
+use crate::config::cell::{ExtruderPart, RunPart};
 use crate::config::extruder::{FeedforwardKeys, ModelSource, Strategy};
-use crate::extruder::feedforward::{InverseSettings, Tracker};
+use crate::extruder::feedforward::{
+    ExtruderModel, FeedforwardError, FlowForecast, InverseSettings, ScrewSpeed, Tracker,
+};
 use crate::extruder::law::{
     AdaptiveNozzle, Constant, Foreseen, OperatingPoint, Played, PressureLoop, ScrewFill,
 };
@@ -16,6 +18,7 @@ use crate::identify::{file as model, profile};
 use crate::io::model_file;
 use crate::io::record::ExtruderFile;
 use crate::io::record::format::{MODEL_ATTACHMENT, PROFILE_ATTACHMENT};
+use crate::model::TransferFunction;
 use crate::time::Span;
 
 /// What the strategy's file is called in a recording; none where it has none.
@@ -59,6 +62,7 @@ pub fn file(part: &ExtruderPart, cell: &str) -> anyhow::Result<Option<ExtruderFi
 /// What the extruder side of a controller has to know, with the file that its
 /// strategy is made from. `cell` is what messages call the cell.
 pub fn setup(
+    run: &RunPart,
     part: &ExtruderPart,
     cell: &str,
     file: Option<&ExtruderFile>,
@@ -67,7 +71,9 @@ pub fn setup(
     let law = match &part.extruder.strategy {
         Strategy::Constant { value } => Law::Constant(Constant(*value)),
         Strategy::Profile { .. } => Law::Profile(played(needed()?, part)?),
-        Strategy::Feedforward(keys) => Law::Feedforward(foreseen(keys, part, cell, needed()?)?),
+        Strategy::Feedforward(keys) => {
+            Law::Feedforward(Box::new(foreseen(keys, run, part, cell, needed()?)?))
+        }
         Strategy::Pressure(settings) => Law::Pressure(Box::new(PressureLoop::new(**settings))),
         Strategy::Screw(settings) => Law::Screw(ScrewFill::new(settings)?),
         Strategy::Adaptive(parts) => Law::Adaptive(AdaptiveNozzle::new(parts.0, parts.1)),
@@ -82,6 +88,7 @@ fn wrong(cell: &str, what: &str) -> WrongArguments {
 /// The inverse of the model that the cell names.
 fn foreseen(
     keys: &FeedforwardKeys,
+    run: &RunPart,
     part: &ExtruderPart,
     cell: &str,
     file: &ExtruderFile,
@@ -107,7 +114,22 @@ fn foreseen(
     };
     let tracker = Tracker::new(&model.transfer, &settings)
         .map_err(|error| wrong(cell, &error.to_string()))?;
-    Ok(Foreseen::new(tracker, OperatingPoint { command, flow_mm3_per_s }))
+    let law = Foreseen::new(tracker, OperatingPoint { command, flow_mm3_per_s }, keys.driven_by);
+    let forecast = forecast(model.transfer, run.robot.rate_hz, settings.period)
+        .map_err(|error| wrong(cell, &error.to_string()))?;
+    Ok(law.foretelling(forecast))
+}
+
+/// What will flow when a setpoint of the robot that is given now has stood for
+/// half of its time, as far as the dead time lets that be known.
+fn forecast(
+    model: TransferFunction,
+    robot_rate_hz: f64,
+    period: Span,
+) -> Result<FlowForecast, FeedforwardError> {
+    let ahead = Span::from_secs(model.dead_time_s().min(0.5 / robot_rate_hz));
+    let model = ExtruderModel { drive: TransferFunction::gain(1.0)?, flow: model };
+    FlowForecast::new(&model, ScrewSpeed::Modelled, ahead, period)
 }
 
 /// A profile of commands; one of another quantity, or beyond the limits, is

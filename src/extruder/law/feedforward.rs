@@ -1,8 +1,8 @@
 //! The inverse of a model behind the face of a strategy: the wanted flow
 //! becomes the command that gives it. bcs-thesis, chapter 4.
 
-use super::{Strategy, Unusable, Wish};
-use crate::extruder::feedforward::Tracker;
+use super::{Need, Strategy, Unusable, Wish};
+use crate::extruder::feedforward::{FlowForecast, Tracker};
 use crate::extruder::report::ExtruderReport;
 use crate::time::{Span, Stamp};
 use crate::units::Mm3PerS;
@@ -16,36 +16,91 @@ pub struct OperatingPoint {
     pub flow_mm3_per_s: f64,
 }
 
+/// What turns the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DrivenBy {
+    /// The command as it was applied.
+    Command,
+    /// The screw as its encoder reports it, in place of a model of the drive
+    /// (thesis, section 5.3.1). The command is in rpm then.
+    Encoder,
+}
+
 /// The inverse about its operating point. It runs on the grid of the
 /// feedforward, for which it was made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Foreseen {
     tracker: Tracker,
     about: OperatingPoint,
+    driven_by: DrivenBy,
+    outlook: Option<Outlook>,
     applied: f64,
+    /// Speed of the screw in the last report \[rpm\].
+    turning: Option<f64>,
     command: f64,
 }
 
+/// The flow that is to come.
+#[derive(Debug, Clone, PartialEq)]
+struct Outlook {
+    forecast: FlowForecast,
+    flow: Mm3PerS,
+}
+
 impl Foreseen {
-    /// Before its first bead. The tracker takes and gives differences from the
-    /// operating point.
-    pub const fn new(tracker: Tracker, about: OperatingPoint) -> Self {
-        Self { tracker, about, applied: 0.0, command: 0.0 }
+    /// Before its first bead. Tracker and forecast take and give differences
+    /// from the operating point.
+    pub const fn new(tracker: Tracker, about: OperatingPoint, driven_by: DrivenBy) -> Self {
+        Self { tracker, about, driven_by, outlook: None, applied: 0.0, turning: None, command: 0.0 }
+    }
+
+    /// The same, which also says what will flow. The forecast is from what
+    /// drives the model to the flow.
+    pub fn foretelling(mut self, forecast: FlowForecast) -> Self {
+        self.outlook = Some(Outlook { forecast, flow: Mm3PerS::ZERO });
+        self
     }
 
     fn aim(&mut self, flow: Mm3PerS) {
         let off = flow.get() - self.about.flow_mm3_per_s;
         self.command = self.about.command + self.tracker.command(off);
     }
+
+    /// What drives the model now, as a difference from the operating point.
+    fn driven(&self) -> f64 {
+        let driven = match self.driven_by {
+            DrivenBy::Command => self.applied,
+            DrivenBy::Encoder => self.turning.unwrap_or(self.applied),
+        };
+        driven - self.about.command
+    }
 }
 
 impl Strategy for Foreseen {
+    fn needs(&self) -> &'static [Need] {
+        match self.driven_by {
+            DrivenBy::Command => &[],
+            DrivenBy::Encoder => &[Need::Screw],
+        }
+    }
+
     fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> Wish {
         // The pump stands, and nothing flows.
-        self.applied = 0.0;
+        (self.applied, self.turning) = (0.0, None);
         self.tracker.start(-self.about.command);
+        if let Some(Outlook { forecast, flow }) = &mut self.outlook {
+            // Only a model without a steady state has none to begin from, and
+            // such a one was refused.
+            let _ = forecast.start(-self.about.command);
+            *flow = Mm3PerS::ZERO;
+        }
         self.aim(flow);
         self.wish()
+    }
+
+    fn hear(&mut self, _now: Stamp, report: &ExtruderReport) -> Result<(), Unusable> {
+        self.turning = report.screw_rpm.map(f64::from);
+        Ok(())
     }
 
     fn foresee(&mut self, dt: Span, flow: Mm3PerS) {
@@ -54,7 +109,12 @@ impl Strategy for Foreseen {
     }
 
     fn wait(&mut self, _dt: Span) {
-        self.tracker.pass(self.applied - self.about.command);
+        let driven = self.driven();
+        self.tracker.pass(driven);
+        if let Some(Outlook { forecast, flow }) = &mut self.outlook {
+            let told = forecast.step(driven, None).get() + self.about.flow_mm3_per_s;
+            *flow = Mm3PerS::new(told.max(0.0)).unwrap_or_default();
+        }
     }
 
     fn answer(&mut self, _now: Stamp, _dt: Span, _report: &ExtruderReport) -> Result<(), Unusable> {
@@ -63,6 +123,10 @@ impl Strategy for Foreseen {
 
     fn wish(&self) -> Wish {
         Wish::known(self.command)
+    }
+
+    fn foretold(&self) -> Option<Mm3PerS> {
+        self.outlook.as_ref().map(|outlook| outlook.flow)
     }
 
     // The tracker knows the way from where a command that was kept has led.
@@ -77,8 +141,9 @@ impl Strategy for Foreseen {
 mod tests {
     use super::*;
     use crate::extruder::CommandLimits;
-    use crate::extruder::feedforward::{InverseSettings, RightZeros};
+    use crate::extruder::feedforward::{ExtruderModel, InverseSettings, RightZeros, ScrewSpeed};
     use crate::model::{Between, Simulator, TransferFunction};
+    use crate::units::Rpm;
 
     const PERIOD: Span = Span::from_millis(5);
 
@@ -96,7 +161,7 @@ mod tests {
             limits,
             period: PERIOD,
         };
-        Foreseen::new(Tracker::new(model, &settings).unwrap(), about)
+        Foreseen::new(Tracker::new(model, &settings).unwrap(), about, DrivenBy::Command)
     }
 
     /// Shares of a wanted flow over time, and the commands.
@@ -160,6 +225,64 @@ mod tests {
         assert!(2 * with < without, "{with} {without}");
         let most = course.iter().fold(0.0_f64, |most, share| most.max(*share));
         assert!(most < 1.03, "{most}");
+    }
+
+    #[test]
+    fn an_encoder_takes_the_place_of_the_drives_model() {
+        // The screw turns 20 % slower than it is told: the model knows, and tells
+        // more, until it is told what the flow needs.
+        let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
+        let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
+        let mut law = law(&model, limits, OperatingPoint::default(), 0.1);
+        law.driven_by = DrivenBy::Encoder;
+        assert_eq!(law.needs(), [Need::Screw]);
+        let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
+        let mut told = law.begin(Stamp::START, Mm3PerS::constant(480.0)).value;
+        let mut flow = 0.0;
+        for _ in 0..2000 {
+            law.settle(Stamp::START, told);
+            flow = plant.step(0.8 * told);
+            let report = ExtruderReport {
+                screw_rpm: Some(Rpm::new(0.8 * told).unwrap()),
+                ..crate::extruder::law::tests::report()
+            };
+            law.hear(Stamp::START, &report).unwrap();
+            law.foresee(PERIOD, Mm3PerS::constant(480.0));
+            told = law.wish().value;
+        }
+        // u = (d − (1 − λ/τ)·0.8·u)·τ/λ in the steady state, λ/τ = 0.1/0.84.
+        let share = 0.1 / 0.84;
+        let expected = 480.0 / (share + (1.0 - share) * 0.8) * 0.8;
+        assert!((flow - expected).abs() < 0.5, "{flow} {expected}");
+        assert!(flow > 0.97 * 480.0, "{flow}");
+    }
+
+    #[test]
+    fn what_will_flow_is_told_from_what_was_applied() {
+        let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.2).unwrap();
+        let limits = CommandLimits::new(0.0, 60.0, 1e6).unwrap();
+        let about = OperatingPoint { command: 30.0, flow_mm3_per_s: 360.0 };
+        let whole =
+            ExtruderModel { drive: TransferFunction::gain(1.0).unwrap(), flow: model.clone() };
+        let ahead = Span::from_millis(100);
+        let forecast = FlowForecast::new(&whole, ScrewSpeed::Modelled, ahead, PERIOD).unwrap();
+        let mut law = law(&model, limits, about, 0.25).foretelling(forecast);
+        let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
+        let mut told = law.begin(Stamp::START, Mm3PerS::constant(480.0)).value.min(60.0);
+        assert_eq!(law.foretold(), Some(Mm3PerS::ZERO));
+        let (mut foretold, mut flows) = (Vec::new(), Vec::new());
+        for _ in 0..600 {
+            law.settle(Stamp::START, told);
+            flows.push(plant.step(told));
+            law.foresee(PERIOD, Mm3PerS::constant(480.0));
+            foretold.push(law.foretold().unwrap().get());
+            told = law.wish().value.clamp(0.0, 60.0);
+        }
+        // 100 ms are 20 periods.
+        for (told, flow) in foretold.iter().zip(&flows[20..]) {
+            assert!((told - flow).abs() < 5.0, "{told} {flow}");
+        }
+        assert!(flows[30] < 5.0 && flows[599] > 475.0);
     }
 
     #[test]

@@ -23,7 +23,7 @@ use crate::units::{MPa, Mm, Mm2, Rpm};
 
 const TICK: Span = Span::from_millis(5);
 
-fn report() -> ExtruderReport {
+pub(super) fn report() -> ExtruderReport {
     ExtruderReport {
         pump: PumpMode::On,
         valve_open: true,
@@ -45,6 +45,7 @@ fn supervisor(drive: Drive, law: Law, limits: CommandLimits) -> Supervisor {
         max_gap: Span::from_millis(200),
         max_hold: Span::from_secs(2.0),
         max_pressure: None,
+        robot_follows: crate::extruder::RobotFollows::Nothing,
     })
 }
 
@@ -232,8 +233,12 @@ fn foreseen() -> (Supervisor, Box<dyn Machine>) {
         limits,
         period: TICK,
     };
-    let law = Foreseen::new(Tracker::new(&model, &settings).unwrap(), OperatingPoint::default());
-    let side = supervisor(Drive::Rpm, Law::Feedforward(law), limits);
+    let law = Foreseen::new(
+        Tracker::new(&model, &settings).unwrap(),
+        OperatingPoint::default(),
+        DrivenBy::Command,
+    );
+    let side = supervisor(Drive::Rpm, Law::Feedforward(Box::new(law)), limits);
     (side, Box::new(Lagging::new(12.0, 0.84)))
 }
 

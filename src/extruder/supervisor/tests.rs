@@ -17,6 +17,7 @@ fn setup(law: Law) -> ExtruderSetup {
         max_gap: Span::from_millis(200),
         max_hold: Span::from_secs(1.0),
         max_pressure: Some(MPa::constant(2.0)),
+        robot_follows: RobotFollows::Nothing,
     }
 }
 
