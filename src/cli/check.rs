@@ -45,11 +45,11 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     say!("  suffices for process, render");
     match Cell::parse(&args.cell, &loaded.text, Purpose::Run) {
         Ok(cell) => {
-            say!("  suffices for {}", purposes(cell.run.as_ref()));
-            if let Some(run) = &cell.run {
-                about_run(run);
-            }
-            about_extruder(&LoadedCell { cell, ..loaded })?;
+            let loaded = LoadedCell { cell, ..loaded };
+            let Some(run) = &loaded.cell.run else { return Ok(ExitCode::SUCCESS) };
+            about_purposes(run);
+            about_run(run);
+            about_extruder(&loaded)?;
         }
         Err(missing) => {
             say!("  not for run, simulate; these need besides:");
@@ -123,14 +123,27 @@ fn about_surface(loaded: &LoadedCell) {
     }
 }
 
-/// What a cell suffices for that has all that a run needs.
-fn purposes(run: Option<&RunPart>) -> &'static str {
-    let extruder = run.and_then(|run| run.extruder.as_ref());
-    match extruder.map(|part| (part.extruder.link.is_some(), part.plant.is_some())) {
-        None | Some((true, true)) => "run, simulate",
-        Some((true, false)) => "run",
-        Some((false, true)) => "simulate",
-        Some((false, false)) => "neither run nor simulate",
+/// What a cell suffices for that has all that a run needs of a robot's side,
+/// and what is missing of the extruder's for the rest.
+fn about_purposes(run: &RunPart) {
+    let (reached, answered) = run
+        .extruder
+        .as_ref()
+        .map_or((true, true), |part| (part.extruder.link.is_some(), part.plant.is_some()));
+    let needs = [
+        ("run", reached, "extruder.driver, address: \"line\" and host:port"),
+        ("simulate", answered, "extruder_plant: what answers the extruder's commands"),
+    ];
+    for (purpose, met, _) in needs {
+        if met {
+            say!("  suffices for {purpose}");
+        }
+    }
+    for (purpose, met, missing) in needs {
+        if !met {
+            say!("  not for {purpose}; this needs besides:");
+            say!("    {missing}");
+        }
     }
 }
 
@@ -147,8 +160,6 @@ fn about_extruder(loaded: &LoadedCell) -> anyhow::Result<()> {
     let _ = loaded.extruder()?;
     if part.plant.is_some() {
         let _ = loaded.plant(part)?;
-    } else {
-        say!("  WARNING      [extruder_plant] is missing: nothing answers in a simulation");
     }
     if let Some(link) = &extruder.link {
         say!(
@@ -156,8 +167,6 @@ fn about_extruder(loaded: &LoadedCell) -> anyhow::Result<()> {
             link.address,
             link.valid_ms
         );
-    } else {
-        say!("  WARNING      extruder.driver and address are missing: a live run needs them");
     }
     Ok(())
 }
