@@ -58,6 +58,8 @@ pub struct SimCamera {
     seq: u64,
     gauge_length: f64,
     noise: Mm,
+    /// Widths that are believed.
+    width_range: (Mm, Mm),
     rides: bool,
     calibration: Calibration,
     surface_height: Mm,
@@ -83,6 +85,7 @@ impl SimCamera {
             seq: 0,
             gauge_length: simulation.gauge_length.get(),
             noise: simulation.width_noise,
+            width_range: cell.gauge.width_range,
             rides: cell.mount != Some(Mount::Fixed),
             calibration,
             surface_height: cell.surface_height,
@@ -148,6 +151,11 @@ impl SimCamera {
         let truth = truth.ok_or(refused)?;
         let [noise, _] = hash::normal_pair(hash::mix(&[self.seed, NOISE, seq]));
         let width = Mm::new(truth + noise * self.noise.get()).map_err(|_| refused)?;
+        let (min, max) = self.width_range;
+        if !(min..=max).contains(&width) {
+            let (got_mm, min_mm, max_mm) = (width.get(), min.get(), max.get());
+            return Err(Reject::WidthOutOfRange { got_mm, min_mm, max_mm }.status());
+        }
         let (left, right) = self.edge_points(width, surface).ok_or(refused)?;
         Ok(WidthMeasurement {
             width,
