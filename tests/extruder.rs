@@ -14,21 +14,37 @@ fn truebead(folder: &Path, args: &[&str]) -> Output {
     Command::cargo_bin("truebead").unwrap().current_dir(folder).args(args).output().unwrap()
 }
 
-/// Simulates the shipped cell with some lines changed; gives status, standard
-/// error and the summary, if there is one.
-fn simulated(changes: &[(&str, &str)]) -> (Option<i32>, String, serde_json::Value) {
-    let folder = tempfile::tempdir().unwrap();
-    let mut text = CELL.to_owned();
-    for (from, to) in changes {
+/// A cell's text with some parts of it replaced.
+fn changed(cell: &str, changes: &[(&str, &str)]) -> String {
+    changes.iter().fold(cell.to_owned(), |text, (from, to)| {
         assert!(text.contains(from), "{from}");
-        text = text.replace(from, to);
-    }
-    fs::write(folder.path().join("cell.toml"), text).unwrap();
+        text.replace(from, to)
+    })
+}
+
+/// `[extruder_plant]` of the shipped cell.
+fn plant() -> &'static str {
+    &CELL[CELL.find("[extruder_plant]").unwrap()..CELL.find("[simulation]").unwrap()]
+}
+
+/// Simulates a cell with some parts of it replaced; gives status, standard
+/// error and the summary, if there is one.
+fn simulated_cell(
+    cell: &str,
+    changes: &[(&str, &str)],
+) -> (Option<i32>, String, serde_json::Value) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("cell.toml"), changed(cell, changes)).unwrap();
     let output = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out"]);
     let summary = fs::read_to_string(folder.path().join("out/summary.json"))
         .map_or(serde_json::Value::Null, |text| serde_json::from_str(&text).unwrap());
     let said = String::from_utf8(output.stderr).unwrap();
     (output.status.code(), said, summary)
+}
+
+/// The same for the cell whose command is constant.
+fn simulated(changes: &[(&str, &str)]) -> (Option<i32>, String, serde_json::Value) {
+    simulated_cell(CELL, changes)
 }
 
 #[test]
@@ -83,9 +99,7 @@ fn a_bead_narrower_than_it_is_high_is_refused() {
 
 #[test]
 fn a_simulation_without_a_plant_says_what_is_missing() {
-    let cut = CELL.find("[extruder_plant]").unwrap();
-    let end = CELL.find("[simulation]").unwrap();
-    let (status, said, _) = simulated(&[(&CELL[cut..end], "")]);
+    let (status, said, _) = simulated(&[(plant(), "")]);
     assert_eq!(status, Some(2));
     assert!(said.contains("[extruder_plant]"), "{said}");
 }
@@ -113,4 +127,49 @@ fn a_profile_is_played_and_a_bad_one_has_its_line() {
         assert_eq!(output.status.code(), Some(2), "{said}");
         assert!(said.contains("steps.csv") && said.contains(told), "{said}");
     }
+}
+
+#[test]
+fn a_plant_that_never_reports_what_is_gone_by_is_refused() {
+    for (from, to, told) in [
+        (
+            "max_gap_s = 0.2 ",
+            "max_pressure_mpa = 2.0\nmax_gap_s = 0.2 ",
+            "extruder.max_pressure_mpa",
+        ),
+        (
+            "kind = \"direct\"\ngain_mm3_per_s = 1300.0 ",
+            "kind = \"screw\"\nfull_flow_mm3_per_s = 1300.0 ",
+            "extruder_plant.kind",
+        ),
+    ] {
+        let (status, said, _) = simulated(&[(from, to)]);
+        assert_eq!(status, Some(2), "{said}");
+        assert!(said.contains("line ") && said.contains(told), "{said}");
+    }
+    let cell = include_str!("../cells/extruder-adaptive.toml");
+    let (status, said, _) = simulated_cell(cell, &[("flow_sensor_noise_mm3_per_s = 200.0", "")]);
+    assert_eq!(status, Some(2), "{said}");
+    assert!(said.contains("extruder.strategy") && said.contains("flow_sensor_noise"), "{said}");
+}
+
+#[test]
+fn check_says_what_a_cell_suffices_for_and_what_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let checked = |changes: &[(&str, &str)]| {
+        fs::write(folder.path().join("cell.toml"), changed(CELL, changes)).unwrap();
+        let output = truebead(folder.path(), &["check", "cell.toml"]);
+        assert_eq!(output.status.code(), Some(0), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let both = checked(&[]);
+    assert!(both.contains("suffices for run\n") && both.contains("suffices for simulate\n"));
+    let link = "driver = \"line\"                 # driver, address: for a live run only\n\
+                address = \"127.0.0.1:5654\"\n";
+    let simulates = checked(&[(link, "")]);
+    assert!(simulates.contains("suffices for simulate\n"), "{simulates}");
+    assert!(simulates.contains("not for run;") && simulates.contains("extruder.driver"));
+    let runs = checked(&[(plant(), "")]);
+    assert!(runs.contains("suffices for run\n"), "{runs}");
+    assert!(runs.contains("not for simulate;") && runs.contains("extruder_plant"), "{runs}");
 }

@@ -151,7 +151,7 @@ fn about_purposes(run: &RunPart) {
 fn about_extruder(loaded: &LoadedCell) -> anyhow::Result<()> {
     let part = loaded.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
     let Some(part) = part else { return Ok(()) };
-    let (extruder, unit) = (&part.extruder, part.extruder.drive.unit());
+    let (extruder, unit) = (&part.extruder, part.extruder.drive.unit_word());
     let (low, high) = extruder.limits.range();
     say!(
         "  extruder     told {low} to {high} {unit}, {:.1} mm³/s wanted",

@@ -5,18 +5,18 @@
 use std::path::{Path, PathBuf};
 
 use super::control::{self, Control};
-use super::extruder::{Extruder, ExtruderPlant};
 use super::problem::Problems;
 use super::rendered::{self, Simulation};
 use super::table::{Document, Table};
 use crate::calib::{Calibration, SurfaceMap};
 use crate::control::limiter::Limits;
-use crate::extruder::FlowDemand;
 use crate::frame::Channel;
 use crate::geometry::Roi;
 use crate::time::Span;
-use crate::units::{Mm, Mm3PerS, MmPerS};
+use crate::units::{Mm, MmPerS};
 use crate::vision::{Axis, Gauge, Method, Polarity};
+
+pub use super::extruder::ExtruderPart;
 
 /// Largest image side that is taken \[px\].
 const MAX_SIDE_PX: f64 = 65_536.0;
@@ -75,19 +75,6 @@ pub struct RunPart {
     pub robot: Robot,
     /// The extruder, where it is commanded.
     pub extruder: Option<ExtruderPart>,
-}
-
-/// The extruder side of a cell.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ExtruderPart {
-    /// What it is told.
-    pub extruder: Extruder,
-    /// The flow that is wanted.
-    pub demand: FlowDemand,
-    /// What answers in a simulated cell, if the file says so.
-    pub plant: Option<ExtruderPlant>,
-    /// Flow at which the simulated bead is as wide as `[bead]` says.
-    pub plant_nominal: Mm3PerS,
 }
 
 /// Where the calibration comes from.
@@ -241,7 +228,8 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let robot = root.run_table("robot").as_ref().and_then(|t| read_robot(t, limits));
     let simulation = rendered::read(root);
     let speed = robot.as_ref().map(|robot| robot.start_speed);
-    let extruder = read_extruder(root, folder, target.zip(speed), simulation.as_ref());
+    let bead = target.zip(speed);
+    let extruder = ExtruderPart::read(root, folder, bead, simulation.as_ref());
     let run = match (control, limits, camera, robot) {
         (Some(control), Some(limits), Some(camera), Some(robot)) => {
             Some(RunPart { control, limits, camera, robot, extruder })
@@ -419,31 +407,6 @@ fn read_robot(table: &Table<'_>, limits: Option<Limits>) -> Option<Robot> {
         start_length: Mm::new(start_length?).ok()?,
         valid_ms: u32::try_from(valid_ms?).ok()?,
     })
-}
-
-/// `[extruder]` and `[extruder_plant]`; none where the extruder goes its own
-/// way, and where a violation was reported.
-fn read_extruder(
-    root: &Table<'_>,
-    folder: &Path,
-    bead: Option<(Mm, MmPerS)>,
-    simulation: Option<&Simulation>,
-) -> Option<ExtruderPart> {
-    let plant_table = root.optional_run_table("extruder_plant");
-    let plant = plant_table.as_ref().and_then(ExtruderPlant::read);
-    let Some(table) = root.optional_run_table("extruder") else {
-        if plant_table.is_some() {
-            root.report("extruder_plant", "a plant of no extruder", "a table [extruder] beside it");
-        }
-        return None;
-    };
-    let extruder = Extruder::read(&table, folder)?;
-    let (target, speed) = bead?;
-    let demand = extruder.demand(&table, target, speed)?;
-    let model = simulation?.bead;
-    let (width, at) = (Mm::new(model.width_mm).ok()?, MmPerS::new(model.at_speed_mm_per_s).ok()?);
-    let plant_nominal = extruder.demand(&table, width, at)?.nominal();
-    Some(ExtruderPart { extruder, demand, plant, plant_nominal })
 }
 
 fn read_recording(table: Option<&Table<'_>>) -> Option<Recording> {

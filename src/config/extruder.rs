@@ -4,6 +4,7 @@
 
 mod adaptive;
 mod link;
+mod part;
 mod plant;
 mod pressure;
 mod screw;
@@ -12,6 +13,7 @@ mod strategy;
 use std::path::Path;
 
 pub use link::ExtruderLink;
+pub use part::ExtruderPart;
 pub use plant::{ExtruderPlant, LinearPlant, PlantKind, PressurePlant, ScrewPlant};
 pub use strategy::{FeedforwardKeys, ModelSource, Strategy};
 

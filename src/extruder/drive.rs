@@ -33,6 +33,11 @@ impl Drive {
         ("filling", Self::Filling),
     ];
 
+    /// The word that a cell file has for it.
+    pub fn word(self) -> &'static str {
+        Self::WORDS.into_iter().find(|known| known.1 == self).map_or("", |known| known.0)
+    }
+
     /// All of them with the word for the unit that ends the keys of a cell file
     /// and stands on the extruder link.
     const UNIT_WORDS: [(&'static str, Self); 6] = [

@@ -4,6 +4,7 @@
 use super::pressure::{read_nozzle, read_process};
 use super::screw::read_screw;
 use crate::config::table::Table;
+use crate::extruder::law::Need;
 use crate::extruder::pressure::Fopdt;
 use crate::extruder::rheology::PowerLaw;
 use crate::extruder::screw::{Screw, ScrewDesign};
@@ -37,6 +38,17 @@ pub enum PlantKind {
     Pressure(PressurePlant),
     /// A screw that is filled through its feed.
     Screw(ScrewPlant),
+}
+
+impl PlantKind {
+    /// Whether it has a sensor of that.
+    pub const fn reports(&self, reading: Need) -> bool {
+        match self {
+            Self::Linear(plant) => matches!(reading, Need::Flow) && plant.sensor_noise.is_some(),
+            Self::Pressure(_) => matches!(reading, Need::Pressure),
+            Self::Screw(_) => matches!(reading, Need::Filled),
+        }
+    }
 }
 
 /// A pressure at the nozzle in a simulated cell.

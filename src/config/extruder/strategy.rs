@@ -103,17 +103,17 @@ impl Strategy {
             }
             Word::Feedforward => read_feedforward(table, about).map(Self::Feedforward),
             Word::Pressure => {
-                needs(table, about, Drive::Rpm, "rpm");
+                needs(table, about, Drive::Rpm);
                 pressure::read(&table.required_table("pressure")?, about)
                     .map(|settings| Self::Pressure(Box::new(settings)))
             }
             Word::Screw => {
-                needs(table, about, Drive::Filling, "filling");
+                needs(table, about, Drive::Filling);
                 screw::read_law(&table.required_table("screw")?, about)
                     .map(|settings| Self::Screw(Box::new(settings)))
             }
             Word::Adaptive => {
-                needs(table, about, Drive::MassFlow, "mass_flow");
+                needs(table, about, Drive::MassFlow);
                 adaptive::read(&table.required_table("adaptive")?, about)
                     .map(|law| Self::Adaptive(Box::new(law)))
             }
@@ -122,10 +122,10 @@ impl Strategy {
 }
 
 /// Reports a command of another quantity than the strategy gives.
-fn needs(table: &Table<'_>, about: &About<'_>, drive: Drive, word: &str) {
+fn needs(table: &Table<'_>, about: &About<'_>, drive: Drive) {
     if about.drive != drive {
-        let found = Drive::WORDS.iter().find(|known| known.1 == about.drive).map_or("", |k| k.0);
-        let expected = format!("\"{word}\", which this strategy gives");
+        let (found, given) = (about.drive.word(), drive.word());
+        let expected = format!("\"{given}\", which this strategy gives");
         table.report("command", format!("\"{found}\""), expected);
     }
 }
