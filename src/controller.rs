@@ -339,12 +339,12 @@ impl Controller {
             Phase::Tracking { demand, .. } => *demand,
             Phase::Holding { .. } => self.told.map_or(self.setup.start_speed, |(_, speed)| speed),
         };
+        trace.demand_mm_per_s = Some(speed);
         // A hold keeps the speed as it is, whatever flows.
         let speed = match self.phase {
             Phase::Holding { .. } => speed,
             _ => speed * self.flow_share(),
         };
-        trace.demand_mm_per_s = Some(speed);
         let (last_at, last) = self.told.unwrap_or((now, speed));
         let limited = self.setup.limits.apply(speed, last, now - last_at);
         self.limit = match (limited.limit, self.verdict) {

@@ -175,6 +175,7 @@ mod tests {
             flow_noise: 0.0,
             flow_noise_lag_s: 0.15,
             sensor_noise: None,
+            screw_lag_s: None,
         };
         SimExtruder::new(Box::new(Linear::new(&plant, 1).unwrap()), delays)
     }

@@ -29,6 +29,7 @@ fn sim_on(listener: TcpListener) -> ExtruderSim {
         flow_noise: 0.0,
         flow_noise_lag_s: 0.15,
         sensor_noise: Some(0.0),
+        screw_lag_s: None,
     };
     let plant = Linear::new(&plant, 1).unwrap();
     let options = ExtruderOptions {

@@ -62,7 +62,7 @@ impl ExtruderPart {
 /// reports what is needed: nothing of such a cell could be simulated.
 fn compare(extruder: &Extruder, table: &Table<'_>, kind: &PlantKind, plant_table: &Table<'_>) {
     let taken = match kind {
-        PlantKind::Linear(_) => None,
+        PlantKind::Linear(plant) => plant.screw_lag_s.map(|_| Drive::Rpm),
         PlantKind::Pressure(_) => Some(Drive::Rpm),
         PlantKind::Screw(_) => Some(Drive::Filling),
     };
@@ -80,7 +80,8 @@ fn compare(extruder: &Extruder, table: &Table<'_>, kind: &PlantKind, plant_table
         Strategy::Pressure(_) => Some(Need::Pressure),
         Strategy::Screw(_) => Some(Need::Filled),
         Strategy::Adaptive(_) => Some(Need::Flow),
-        Strategy::Constant { .. } | Strategy::Profile { .. } | Strategy::Feedforward(_) => None,
+        Strategy::Feedforward(ref keys) => keys.driven_by.need(),
+        Strategy::Constant { .. } | Strategy::Profile { .. } => None,
     };
     let limited = extruder.max_pressure.map(|_| Need::Pressure);
     for (key, need) in [("strategy", needed), ("max_pressure_mpa", limited)] {
@@ -89,6 +90,7 @@ fn compare(extruder: &Extruder, table: &Table<'_>, kind: &PlantKind, plant_table
                 Need::Pressure => ("a pressure", "kind = \"pressure\""),
                 Need::Filled => ("a filled length", "kind = \"screw\""),
                 Need::Flow => ("a flow", "flow_sensor_noise_mm3_per_s"),
+                Need::Screw => ("the screw's speed", "screw_lag_s"),
             };
             let found = format!("{reading} to go by, which [extruder_plant] never reports");
             table.report(key, found, format!("one with {plant}, or none at all"));

@@ -44,8 +44,12 @@ impl PlantKind {
     /// Whether it has a sensor of that.
     pub const fn reports(&self, reading: Need) -> bool {
         match self {
-            Self::Linear(plant) => matches!(reading, Need::Flow) && plant.sensor_noise.is_some(),
-            Self::Pressure(_) => matches!(reading, Need::Pressure),
+            Self::Linear(plant) => match reading {
+                Need::Flow => plant.sensor_noise.is_some(),
+                Need::Screw => plant.screw_lag_s.is_some(),
+                Need::Pressure | Need::Filled => false,
+            },
+            Self::Pressure(_) => matches!(reading, Need::Pressure | Need::Screw),
             Self::Screw(_) => matches!(reading, Need::Filled),
         }
     }
@@ -84,6 +88,9 @@ pub struct LinearPlant {
     pub flow_noise_lag_s: f64,
     /// Noise of a sensor of the flow \[mm³/s\]; none has no sensor.
     pub sensor_noise: Option<f64>,
+    /// Time constant with which the screw follows a command in rpm \[s\], as its
+    /// encoder reports; none follows at once and has no encoder.
+    pub screw_lag_s: Option<f64>,
 }
 
 /// A screw in a simulated cell.
@@ -168,6 +175,7 @@ fn read_linear(table: &Table<'_>, transfer: TransferFunction) -> Option<LinearPl
     let noise = table.number_or("flow_noise_mm3_per_s", 0.0..=1e12, 0.0);
     let lag = table.number_or("flow_noise_lag_s", 1e-3..=1e3, 0.15);
     let sensor = table.optional_number("flow_sensor_noise_mm3_per_s", 0.0..=1e12);
+    let screw = table.optional_number("screw_lag_s", 0.0..=60.0);
     Some(LinearPlant {
         transfer,
         unknown_input: unknown?,
@@ -175,6 +183,7 @@ fn read_linear(table: &Table<'_>, transfer: TransferFunction) -> Option<LinearPl
         flow_noise: noise?,
         flow_noise_lag_s: lag?,
         sensor_noise: sensor,
+        screw_lag_s: screw,
     })
 }
 

@@ -26,6 +26,16 @@ pub enum DrivenBy {
     Encoder,
 }
 
+impl DrivenBy {
+    /// The reading that takes.
+    pub const fn need(self) -> Option<Need> {
+        match self {
+            Self::Command => None,
+            Self::Encoder => Some(Need::Screw),
+        }
+    }
+}
+
 /// The inverse about its operating point. It runs on the grid of the
 /// feedforward, for which it was made.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,7 +6,7 @@ use crate::config::extruder::LinearPlant;
 use crate::extruder::ExtruderReport;
 use crate::model::{Between, ModelError, Simulator};
 use crate::sim::hash::{mix, normal_pair};
-use crate::units::Mm3PerS;
+use crate::units::{Mm3PerS, Rpm};
 
 /// Keeps the random numbers of flow and sensor apart from others of a seed.
 const FLOW: u64 = 0x0000_666c_6f77;
@@ -20,6 +20,8 @@ pub struct Linear {
     seed: u64,
     steps: u64,
     reports: u64,
+    /// What the screw does, in the unit of the command.
+    turning: f64,
     modelled: f64,
     wandering: f64,
 }
@@ -29,8 +31,18 @@ impl Linear {
     pub fn new(plant: &LinearPlant, seed: u64) -> Result<Self, ModelError> {
         let simulator = Simulator::new(&plant.transfer, STEP.secs(), Between::Held)?;
         let plant = plant.clone();
-        let (steps, reports, modelled, wandering) = (0, 0, 0.0, 0.0);
-        Ok(Self { simulator, plant, seed, steps, reports, modelled, wandering })
+        let (turning, modelled, wandering) = (0.0, 0.0, 0.0);
+        Ok(Self { simulator, plant, seed, steps: 0, reports: 0, turning, modelled, wandering })
+    }
+
+    /// The screw after a step with a command.
+    fn turn(&self, command: f64) -> f64 {
+        match self.plant.screw_lag_s {
+            Some(lag_s) if lag_s > 0.0 => {
+                command + (self.turning - command) * libm::exp(-STEP.secs() / lag_s)
+            }
+            _ => command,
+        }
     }
 
     fn unknown(&self) -> f64 {
@@ -42,7 +54,9 @@ impl Linear {
 
 impl Plant for Linear {
     fn advance(&mut self, command: Option<f64>) {
-        let input = command.map_or(0.0, |command| command + self.unknown());
+        self.turning = self.turn(command.unwrap_or(0.0));
+        let unknown = if command.is_some() { self.unknown() } else { 0.0 };
+        let input = self.turning + unknown;
         self.modelled = self.simulator.step(input);
         if self.plant.flow_noise > 0.0 {
             let kept = libm::exp(-STEP.secs() / self.plant.flow_noise_lag_s);
@@ -58,6 +72,9 @@ impl Plant for Linear {
     }
 
     fn sense(&mut self, report: &mut ExtruderReport) {
+        if self.plant.screw_lag_s.is_some() {
+            report.screw_rpm = Rpm::new(self.turning).ok();
+        }
         if let Some(noise) = self.plant.sensor_noise {
             let [fresh, _] = normal_pair(mix(&[self.seed, SENSOR, self.reports]));
             self.reports += 1;
