@@ -63,6 +63,14 @@ pub fn figures(summary: &Summary) {
     {
         say!("flow       {mean:.1} mm³/s on average, {error:.1} mm³/s RMS from what was wanted");
     }
+    if let Some(profile) = summary.extruder.as_ref().and_then(|extruder| extruder.profile) {
+        say!(
+            "profile    {:.1} % of {:.1} s played, bead laid for {:.1} s after it",
+            100.0 * profile.played_share,
+            profile.lasts_s,
+            profile.outlasted_s
+        );
+    }
     say!("faults     {}", control.faults);
     for (reason, count) in &control.fault_reasons {
         say!("           {count} {}", names::spoken(reason));

@@ -82,7 +82,7 @@ pub fn drive(
         gauge: loaded.cell.gauge,
         target: loaded.cell.target,
         max_rejected_share: loaded.cell.recording.max_rejected_share,
-        control: Some(ControlFacts::of(&run)),
+        control: Some(ControlFacts::of(&run, extruder.as_ref().map(|side| &side.setup.law))),
     })?;
     let record = RecordConfig {
         frames: loaded.cell.recording.frames,

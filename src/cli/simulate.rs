@@ -55,6 +55,7 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     }
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
     let extruder = loaded.simulated_extruder()?;
+    let law = extruder.as_ref().map(|rig| rig.setup.law.clone());
     let calibration = loaded.calibration.clone();
     let recorder = SimRecorder::of(args, &loaded)?;
     let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, recorder, extruder)?;
@@ -69,7 +70,7 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
         gauge: loaded.cell.gauge,
         target: loaded.cell.target,
         max_rejected_share: loaded.cell.recording.max_rejected_share,
-        control: Some(ControlFacts::of(&run)),
+        control: Some(ControlFacts::of(&run, law.as_ref())),
     })?;
     let progress = Progress::new("simulating", "s", None, voice.quiet);
     let mut logger = Logger { log, failed: None, progress };

@@ -13,9 +13,9 @@ use super::widths::WidthsWriter;
 use crate::config::cell::RunPart;
 use crate::control::limiter::Limits;
 use crate::control::{Event, Step};
-use crate::extruder::Drive;
+use crate::extruder::{Drive, Law};
 use crate::frame::Frame;
-use crate::time::Stamp;
+use crate::time::{Span, Stamp};
 use crate::units::{Mm, Mm3PerS};
 use crate::vision::{Edges, Gauge};
 
@@ -48,13 +48,19 @@ pub struct ControlFacts {
     pub limits: Limits,
     /// What the extruder is told, where it is commanded.
     pub extruder: Option<Drive>,
+    /// How long the profile is that it plays, where it plays one.
+    pub profile: Option<Span>,
 }
 
 impl ControlFacts {
-    /// Of a cell's run.
-    pub fn of(run: &RunPart) -> Self {
+    /// Of a cell's run, with the law of its extruder.
+    pub fn of(run: &RunPart, law: Option<&Law>) -> Self {
         let extruder = run.extruder.as_ref().map(|part| part.extruder.drive);
-        Self { limits: run.limits, extruder }
+        let profile = law.and_then(|law| match law {
+            Law::Profile(played) => Some(played.lasts()),
+            _ => None,
+        });
+        Self { limits: run.limits, extruder, profile }
     }
 }
 
@@ -76,7 +82,8 @@ impl RunLog {
         let with_control = options.control.is_some();
         Ok(Self {
             widths: WidthsWriter::create(&options.folder, with_control)?,
-            summary: SummaryBuilder::new(options.target, with_control),
+            summary: SummaryBuilder::new(options.target, with_control)
+                .with_profile(options.control.and_then(|control| control.profile)),
             charts: Charts::default(),
             pictures: FramePicker::new(options.gauge),
             remarks: Vec::new(),

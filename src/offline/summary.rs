@@ -3,6 +3,7 @@
 mod control;
 mod extruder;
 mod follow;
+mod profile;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,13 +15,14 @@ use control::ControlTally;
 pub use extruder::ExtruderSummary;
 use extruder::ExtruderTally;
 pub use follow::Follower;
+pub use profile::ProfileSummary;
 
 use super::output::{LogError, write_whole};
 use super::row::FrameRow;
 use super::setup;
 use super::stats::{Distribution, Moments, as_f64};
 use crate::control::{Event, Step};
-use crate::time::Stamp;
+use crate::time::{Span, Stamp};
 use crate::units::{Mm, Mm3PerS};
 
 /// What a run came to. What is not known is null.
@@ -157,6 +159,13 @@ impl SummaryBuilder {
             control: with_control.then(|| ControlTally::new(target)),
             extruder: ExtruderTally::default(),
         }
+    }
+
+    /// The same for a run whose extruder plays a profile of this length.
+    #[must_use]
+    pub fn with_profile(mut self, lasts: Option<Span>) -> Self {
+        self.extruder.plays(lasts);
+        self
     }
 
     /// A frame that was looked at.

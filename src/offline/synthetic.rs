@@ -58,6 +58,7 @@ pub fn options(folder: &Path, title: &str, with_control: bool) -> LogOptions {
                 max_accel: MmPerS2::constant(2000.0),
             },
             extruder: None,
+            profile: None,
         }),
     }
 }

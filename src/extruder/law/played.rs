@@ -43,6 +43,11 @@ impl Played {
     pub const fn new(profile: Profile) -> Self {
         Self { profile, at_s: 0.0 }
     }
+
+    /// How long the profile is; its last command is kept after that.
+    pub fn lasts(&self) -> Span {
+        Span::from_secs(self.profile.end_s())
+    }
 }
 
 impl Strategy for Played {

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use crate::offline::names::spoken;
-use crate::offline::summary::{ControlSummary, ExtruderSummary, Summary};
+use crate::offline::summary::{ControlSummary, ExtruderSummary, ProfileSummary, Summary};
 
 /// Share of what was wanted from which on an error is worth a word.
 const FAR_OFF: f64 = 0.05;
@@ -56,6 +56,11 @@ pub fn verdict(summary: &Summary, max_rejected_share: f64) -> Verdict {
             level = level.max(Level::Caution);
         }
         sentences.extend(more);
+        if let Some(profile) = &extruder.profile {
+            let (profile_level, sentence) = profile_sentence(profile);
+            level = level.max(profile_level);
+            sentences.push(sentence);
+        }
     }
     Verdict { level, text: sentences.join(" ") }
 }
@@ -157,6 +162,24 @@ fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
         ));
     }
     sentences
+}
+
+/// Whether a profile was played to its end, and whether the bead went on.
+fn profile_sentence(profile: &ProfileSummary) -> (Level, String) {
+    let ProfileSummary { lasts_s, played_share, outlasted_s } = *profile;
+    if played_share < 1.0 {
+        let sentence = format!(
+            "The bead ended before the profile: {:.1} % of its {lasts_s:.1} s were played.",
+            100.0 * played_share
+        );
+        (Level::Caution, sentence)
+    } else {
+        let sentence = format!(
+            "The profile of {lasts_s:.1} s was played to its end; bead was laid for {outlasted_s:.1} s \
+             more, with its last command."
+        );
+        (Level::Good, sentence)
+    }
 }
 
 fn control_sentences(control: &ControlSummary) -> (Level, Vec<String>) {

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::profile::{ProfileSummary, ProfileTally};
+
 use crate::control::{Event, Step};
 use crate::extruder::{CommandLimit, ExtruderFault, ExtruderState};
 use crate::offline::names;
@@ -31,6 +33,9 @@ pub struct ExtruderSummary {
     pub flow_error_mean_mm3_per_s: Option<f64>,
     /// Mean of that flow.
     pub flow_mean_mm3_per_s: Option<f64>,
+    /// How far its profile was played, where it plays one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub profile: Option<ProfileSummary>,
 }
 
 /// Adds up what the extruder side did.
@@ -44,9 +49,15 @@ pub struct ExtruderTally {
     fault_reasons: BTreeMap<String, u64>,
     error: Moments,
     flow: Moments,
+    profile: Option<ProfileTally>,
 }
 
 impl ExtruderTally {
+    /// A profile of this length is played.
+    pub fn plays(&mut self, lasts: Option<Span>) {
+        self.profile = lasts.map(ProfileTally::new);
+    }
+
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         let Some(side) = &step.extruder else { return };
         self.commands += u64::from(side.command.is_some());
@@ -89,6 +100,7 @@ impl ExtruderTally {
             flow_error_rms_mm3_per_s: self.error.rms(),
             flow_error_mean_mm3_per_s: self.error.mean(),
             flow_mean_mm3_per_s: self.flow.mean(),
+            profile: self.profile.and_then(ProfileTally::finish),
         })
     }
 
@@ -98,6 +110,9 @@ impl ExtruderTally {
             *sum = *sum + span;
         };
         add(&mut self.states, state.name());
+        if let Some(profile) = &mut self.profile {
+            profile.spend(span, state);
+        }
         if let ExtruderState::Holding(why) = state {
             add(&mut self.held_for, names::extruder_hold(why));
         }
