@@ -25,6 +25,7 @@
 //! `sigma` allows for the residuals' own colour (an autoregressive model of them
 //! between the two halves of the sandwich), `sigma_if_white` does not.
 
+mod clipped;
 mod compare;
 mod error;
 mod levenberg;
@@ -38,6 +39,7 @@ mod settings;
 mod spread;
 mod start;
 
+pub use clipped::{Clipped, Column, End};
 pub use compare::{Comparison, Row, compare};
 pub use error::FitError;
 pub use loose::Loose;
@@ -57,7 +59,7 @@ pub const MOST_POLES: usize = 4;
 pub fn fit(samples: &Samples, settings: &Settings) -> Result<Fit, FitError> {
     settings.check(samples)?;
     samples.check_input(settings.before)?;
-    samples.check_clipped()?;
+    samples.check_clipped().map_err(DataError::from)?;
     let problem = Problem::new(samples, settings);
     let best = start::best(&problem)?;
     let straight_through = settings.structure.zeros() == settings.structure.poles();

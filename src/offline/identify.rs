@@ -149,7 +149,9 @@ pub fn study(logs: Logs, forms: &[Settings]) -> Result<Study, Refusal> {
 }
 
 fn samples(data: &Experiment) -> Result<Samples, DataError> {
-    Samples::new(data.input.clone(), data.output.clone(), data.step_s)
+    let samples = Samples::new(data.input.clone(), data.output.clone(), data.step_s)?;
+    samples.check_clipped()?;
+    Ok(samples)
 }
 
 fn refused(row: &Row) -> (String, String) {

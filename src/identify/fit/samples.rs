@@ -1,6 +1,7 @@
 //! Samples of an input and an output, and whether a model can be told from
 //! them.
 
+use super::clipped::Clipped;
 use super::settings::Before;
 
 /// What is wrong with the data.
@@ -85,22 +86,8 @@ pub enum DataError {
         value: f64,
     },
     /// A signal that was cut off.
-    #[error(
-        "the {what} is cut off: {share_percent:.1} % of its samples stand at its {end}, {value}, \
-         in {runs} runs; a model would take the cut for a part of the machine"
-    )]
-    Clipped {
-        /// `input` or `output`.
-        what: &'static str,
-        /// `largest value` or `smallest value`.
-        end: &'static str,
-        /// That value.
-        value: f64,
-        /// Share of the samples \[%\].
-        share_percent: f64,
-        /// Runs of equal samples there.
-        runs: usize,
-    },
+    #[error(transparent)]
+    Clipped(#[from] Clipped),
 }
 
 /// Samples of an input and an output at even times.
@@ -112,15 +99,11 @@ pub struct Samples {
 }
 
 /// A record shorter than this is none.
-const FEWEST: usize = 10;
+pub(super) const FEWEST: usize = 10;
 /// Part of the usual step by which a step may differ.
 const EVEN: f64 = 0.01;
 /// Change of an input as a part of its level that is noise of the arithmetic.
 const HARDLY: f64 = 1e-4;
-/// Shortest run of equal samples that looks cut off.
-const RUN: usize = 3;
-/// Share of samples in such runs from which on a signal is refused.
-const CUT_SHARE: f64 = 0.02;
 
 impl Samples {
     /// Of equally long rows, `dt_s` \[s\] apart. Fails where a number is not
@@ -195,17 +178,6 @@ impl Samples {
         let [least, most] = ends(&self.output);
         if least == most { Err(DataError::ConstantOutput { value: least }) } else { Ok(()) }
     }
-
-    /// Whether input or output stand at an end of their range again and again,
-    /// between samples that differ. Commands that step between levels are not
-    /// taken for cut off, nor an output that has not begun to move or has come
-    /// to rest.
-    pub fn check_clipped(&self) -> Result<(), DataError> {
-        if !is_command(&self.input) {
-            clipped("input", &self.input)?;
-        }
-        clipped("output", &self.output)
-    }
 }
 
 fn finite(what: &'static str, row: &[f64]) -> Result<(), DataError> {
@@ -215,7 +187,7 @@ fn finite(what: &'static str, row: &[f64]) -> Result<(), DataError> {
     }
 }
 
-fn ends(row: &[f64]) -> [f64; 2] {
+pub(super) fn ends(row: &[f64]) -> [f64; 2] {
     row.iter().fold([f64::MAX, f64::MIN], |[least, most], v| [least.min(*v), most.max(*v)])
 }
 
@@ -248,36 +220,6 @@ fn even_step(times_s: &[f64]) -> Result<f64, DataError> {
     #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
     let mean = (times_s[times_s.len() - 1] - times_s[0]) / steps.len() as f64;
     Ok(mean)
-}
-
-/// Whether most samples stand in runs: levels that are held, with ramps between
-/// them where the drive takes steps no faster.
-fn is_command(row: &[f64]) -> bool {
-    let runs = row.chunk_by(|a, b| a == b).map(<[f64]>::len);
-    2 * runs.filter(|run| *run >= RUN).sum::<usize>() > row.len()
-}
-
-fn clipped(what: &'static str, row: &[f64]) -> Result<(), DataError> {
-    let runs: Vec<&[f64]> = row.chunk_by(|a, b| a == b).collect();
-    let inner = runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default();
-    let [least, most] = ends(row);
-    let between = || runs.iter().filter(|run| run[0] != least && run[0] != most);
-    let single = between().filter(|run| run.len() == 1).count();
-    // A command that steps between levels holds most of them.
-    if single < FEWEST || 2 * single < between().map(|run| run.len()).sum() {
-        return Ok(());
-    }
-    for (end, value) in [("smallest value", least), ("largest value", most)] {
-        let at_end = inner.iter().filter(|run| run.len() >= RUN && run[0] == value);
-        let (count, samples) = at_end.fold((0, 0), |(n, sum), run| (n + 1, sum + run.len()));
-        #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
-        let share = samples as f64 / row.len() as f64;
-        if share > CUT_SHARE {
-            let share_percent = 100.0 * share;
-            return Err(DataError::Clipped { what, end, value, share_percent, runs: count });
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

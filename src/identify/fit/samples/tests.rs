@@ -47,27 +47,3 @@ fn an_input_that_does_not_change_is_refused() {
         Err(DataError::ConstantOutput { value: 1.0 })
     );
 }
-
-#[test]
-fn a_signal_cut_off_is_told_from_a_command_that_steps() {
-    let cut: Vec<f64> = sine(600).iter().map(|y| y.min(0.8)).collect();
-    let clipped = Samples::new(sine(600), cut.clone(), 0.1).unwrap().check_clipped();
-    assert!(matches!(
-        clipped,
-        Err(DataError::Clipped { what: "output", end: "largest value", value: 0.8, .. })
-    ));
-    let clipped = Samples::new(cut, sine(600), 0.1).unwrap().check_clipped();
-    assert!(matches!(clipped, Err(DataError::Clipped { what: "input", .. })));
-    let steps: Vec<f64> = (0..600_u32).map(|k| f64::from((k / 20 * 7) % 2)).collect();
-    assert_eq!(Samples::new(steps, sine(600), 0.1).unwrap().check_clipped(), Ok(()));
-    // Levels of a drive that takes its steps over some samples.
-    let level = |k: u32| 5.0 * f64::from((k / 14 * 5) % 3 % 2);
-    let ramps: Vec<f64> =
-        (0..600_u32).map(|k| (level(k) + level(k + 1) + level(k + 2)) / 3.0).collect();
-    assert_eq!(Samples::new(ramps, sine(600), 0.1).unwrap().check_clipped(), Ok(()));
-    // Dead time before, rest after.
-    let mut answer = vec![0.0; 60];
-    answer.extend((0..240).map(|k| 1.0 - libm::exp(-0.05 * f64::from(k))));
-    answer.extend([1.0; 100]);
-    assert_eq!(Samples::new(sine(400), answer, 0.1).unwrap().check_clipped(), Ok(()));
-}

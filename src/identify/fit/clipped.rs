@@ -1,0 +1,255 @@
+//! Signals that were cut off: they stand at an end of their range again and
+//! again, between samples that differ.
+
+use std::fmt;
+
+use super::samples::{FEWEST, Samples, ends};
+
+/// Shortest run of equal samples that looks cut off.
+const RUN: usize = 3;
+/// Share of samples in such runs from which on a signal is refused.
+const CUT_SHARE: f64 = 0.02;
+/// Times that a command comes to an end of its range before that is a cut.
+const ARRIVALS: usize = 3;
+/// A stretch that leaves its chord by less than this share of its height is the
+/// ramp of a drive that takes steps no faster.
+const STRAIGHT: f64 = 0.005;
+/// A command that slows down to less than this share of its mean step before it
+/// stands has settled there, and was not cut off.
+const ABRUPT: f64 = 0.5;
+/// The same for any signal.
+const SETTLED: f64 = 0.1;
+/// A change by less than this share of the range is no step.
+const SMALL: f64 = 0.01;
+
+/// One of the two columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Column {
+    /// What goes in.
+    Input,
+    /// What comes out.
+    Output,
+}
+
+/// An end of a signal's range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// Its smallest value.
+    Smallest,
+    /// Its largest value.
+    Largest,
+}
+
+/// A signal that was cut off, and where.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "the {column} is cut off: {share_percent:.1} % of its samples stand at its {end}, {value}, in \
+     {runs} runs, the longest of {longest} samples from {from_s:.3} s after the beginning on; {}",
+    advice(*.column)
+)]
+pub struct Clipped {
+    /// Which column.
+    pub column: Column,
+    /// At which end of its range.
+    pub end: End,
+    /// The value there.
+    pub value: f64,
+    /// Share of the samples that stand there \[%\].
+    pub share_percent: f64,
+    /// Runs of equal samples there.
+    pub runs: usize,
+    /// Samples of the longest of them.
+    pub longest: usize,
+    /// Where that begins, from the first sample \[s\].
+    pub from_s: f64,
+}
+
+fn advice(column: Column) -> &'static str {
+    match column {
+        Column::Input => {
+            "a model would take the cut for a part of the machine. Excite less, so that the command \
+             stays within its limits, or use a part without it (--from-s, --to-s); steps and binary \
+             sequences may stand at their ends"
+        }
+        Column::Output => {
+            "a model would take the cut for a part of the machine. Set the sensor's range wider, or \
+             excite less"
+        }
+    }
+}
+
+impl fmt::Display for Column {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Input => "input",
+            Self::Output => "output",
+        })
+    }
+}
+
+impl fmt::Display for End {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Smallest => "smallest value",
+            Self::Largest => "largest value",
+        })
+    }
+}
+
+impl Samples {
+    /// Whether input or output were cut off. Commands that step between levels
+    /// are not taken for it, at once or over a ramp, nor an output that has not
+    /// begun to move or has come to rest.
+    pub fn check_clipped(&self) -> Result<(), Clipped> {
+        for (column, row) in [(Column::Input, self.input()), (Column::Output, self.output())] {
+            let signal = Signal::new(row);
+            let is_command = column == Column::Input && signal.is_held();
+            for (end, value) in signal.ends() {
+                let is_cut =
+                    if is_command { signal.is_cut_command(value) } else { signal.varies() };
+                if is_cut {
+                    signal.check(column, end, value, self.dt_s())?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A row in runs of equal samples.
+struct Signal<'a> {
+    row: &'a [f64],
+    runs: Vec<&'a [f64]>,
+    range: [f64; 2],
+}
+
+impl<'a> Signal<'a> {
+    fn new(row: &'a [f64]) -> Self {
+        Self { row, runs: row.chunk_by(|a, b| a == b).collect(), range: ends(row) }
+    }
+
+    const fn ends(&self) -> [(End, f64); 2] {
+        let [least, most] = self.range;
+        [(End::Smallest, least), (End::Largest, most)]
+    }
+
+    fn is_end(&self, value: f64) -> bool {
+        self.range.contains(&value)
+    }
+
+    /// Whether most samples stand in runs.
+    fn is_held(&self) -> bool {
+        let held = self.runs.iter().map(|run| run.len()).filter(|len| *len >= RUN);
+        2 * held.sum::<usize>() > self.row.len()
+    }
+
+    /// Whether it seldom repeats a sample between its ends.
+    fn varies(&self) -> bool {
+        let between = || self.runs.iter().filter(|run| !self.is_end(run[0]));
+        let single = between().filter(|run| run.len() == 1).count();
+        single >= FEWEST && 2 * single >= between().map(|run| run.len()).sum()
+    }
+
+    /// Whether a command that mostly stands was cut off at this end: it runs
+    /// into it, or it has many levels of which only this one comes back.
+    fn is_cut_command(&self, end: f64) -> bool {
+        self.runs_into(end) || self.piles_up(end)
+    }
+
+    /// Whether it comes to this end over samples that are neither held nor on a
+    /// straight ramp, without slowing down, most of the times that it does.
+    fn runs_into(&self, end: f64) -> bool {
+        let at_end = || self.stands().filter(|stand| stand.value == end && stand.is_inside);
+        let is_abrupt = |stand: &Stand<'_>| stand.pace >= ABRUPT && !is_straight(stand.before);
+        let abrupt = at_end().filter(is_abrupt).count();
+        abrupt >= ARRIVALS && 2 * abrupt > at_end().count()
+    }
+
+    /// Whether it holds many levels one after the other, each about once, but
+    /// this one again and again.
+    #[expect(clippy::cast_precision_loss, reason = "counts of levels")]
+    fn piles_up(&self, end: f64) -> bool {
+        let held: Vec<f64> = self.stands().map(|stand| stand.value).collect();
+        let mut inner: Vec<f64> = held.iter().copied().filter(|v| !self.is_end(*v)).collect();
+        // Pulses from one level to others come back to it after each of them.
+        let follow = held.windows(2).filter(|pair| !pair.iter().any(|v| self.is_end(*v))).count();
+        let visits = held.iter().filter(|value| **value == end).count();
+        let inner_visits = inner.len() as f64;
+        inner.sort_by(f64::total_cmp);
+        inner.dedup();
+        let mean = inner_visits / inner.len().max(1) as f64;
+        inner.len().min(follow) >= FEWEST
+            && visits >= ARRIVALS
+            && visits as f64 >= ARRIVALS as f64 * mean
+    }
+
+    /// Runs of equal samples.
+    fn stands(&self) -> impl Iterator<Item = Stand<'_>> {
+        let (mut begin, mut free) = (0, 0);
+        self.runs.iter().filter_map(move |run| {
+            let from = begin;
+            begin += run.len();
+            let before = self.row.get(free..from).unwrap_or_default();
+            (run.len() >= RUN).then(|| {
+                free = begin;
+                let is_inside = from > 0 && begin < self.row.len();
+                let pace = self.pace(before, from);
+                Stand { value: run[0], from, len: run.len(), is_inside, before, pace }
+            })
+        })
+    }
+
+    /// Size of the last step of a stretch before a run as a share of its mean
+    /// one; of a stretch too short for that, whether the run is a step away.
+    #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
+    fn pace(&self, stretch: &[f64], from: usize) -> f64 {
+        let [_, .., before, last] = *stretch else {
+            let pair = self.row.get(from.saturating_sub(1)..=from).unwrap_or_default();
+            let [least, most] = ends(pair);
+            let is_step = most - least > SMALL * (self.range[1] - self.range[0]);
+            return if is_step { 1.0 } else { 0.0 };
+        };
+        let way: f64 = stretch.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
+        if way > 0.0 { (last - before).abs() * (stretch.len() - 1) as f64 / way } else { 1.0 }
+    }
+
+    /// Refuses a signal that stands at this value for long, between others, and
+    /// has not settled there.
+    fn check(&self, column: Column, end: End, value: f64, dt_s: f64) -> Result<(), Clipped> {
+        let is_cut =
+            |stand: &Stand<'_>| stand.value == value && stand.is_inside && stand.pace > SETTLED;
+        let cut: Vec<Stand<'_>> = self.stands().filter(is_cut).collect();
+        let samples: usize = cut.iter().map(|stand| stand.len).sum();
+        let Some(longest) = cut.iter().max_by_key(|stand| stand.len) else { return Ok(()) };
+        #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
+        let (share, from_s) = (samples as f64 / self.row.len() as f64, longest.from as f64 * dt_s);
+        if share <= CUT_SHARE {
+            return Ok(());
+        }
+        let (share_percent, longest) = (100.0 * share, longest.len);
+        Err(Clipped { column, end, value, share_percent, runs: cut.len(), longest, from_s })
+    }
+}
+
+/// A run of equal samples, and those since the last one before it.
+struct Stand<'a> {
+    value: f64,
+    from: usize,
+    len: usize,
+    is_inside: bool,
+    before: &'a [f64],
+    pace: f64,
+}
+
+/// Whether a stretch lies on its chord, as far as two samples and more can.
+#[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
+fn is_straight(stretch: &[f64]) -> bool {
+    let [first, _, .., last] = *stretch else { return true };
+    let slope = (last - first) / (stretch.len() - 1) as f64;
+    let off = stretch.iter().enumerate().map(|(k, value)| (value - first - slope * k as f64).abs());
+    let [least, most] = ends(stretch);
+    off.fold(0.0, f64::max) <= STRAIGHT * (most - least)
+}
+
+#[cfg(test)]
+mod tests;
