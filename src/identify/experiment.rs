@@ -36,7 +36,7 @@ impl fmt::Display for Side {
 
 /// Data that no model can be found in. Samples are counted from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum DataError {
+pub enum ExperimentError {
     /// Hardly anything there.
     #[error("{got} samples: a model takes {FEWEST_SAMPLES} or more")]
     TooFew {
@@ -179,13 +179,13 @@ impl Experiment {
         input: &[f64],
         output: &[f64],
         rules: &Rules,
-    ) -> Result<Self, DataError> {
+    ) -> Result<Self, ExperimentError> {
         let got = time_s.len().min(input.len()).min(output.len());
         if got < FEWEST_SAMPLES {
-            return Err(DataError::TooFew { got });
+            return Err(ExperimentError::TooFew { got });
         }
         check_time(time_s, rules)?;
-        let grid = Grid::of(time_s).ok_or(DataError::TooFew { got })?;
+        let grid = Grid::of(time_s).ok_or(ExperimentError::TooFew { got })?;
         let notes = bridge(&grid, rules)?;
         for (side, values) in [(Side::Input, input), (Side::Output, output)] {
             check_moves(side, values)?;
@@ -227,7 +227,7 @@ impl Experiment {
     /// The beginning to fit to, and this share of it at the end to validate
     /// with. The notes stay with the first. Fails where either is too short, or
     /// the input or the output of either does not move.
-    pub fn split(mut self, share: f64) -> Result<(Self, Self), DataError> {
+    pub fn split(mut self, share: f64) -> Result<(Self, Self), ExperimentError> {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -237,10 +237,10 @@ impl Experiment {
         let kept = (self.len() as f64 * (1.0 - share.clamp(0.0, 1.0))).round() as usize;
         let left = self.len().saturating_sub(kept);
         if left < FEWEST_SAMPLES {
-            return Err(DataError::ShortValidation { got: left });
+            return Err(ExperimentError::ShortValidation { got: left });
         }
         if kept < FEWEST_SAMPLES {
-            return Err(DataError::TooFew { got: kept });
+            return Err(ExperimentError::TooFew { got: kept });
         }
         let (input, output) = (self.input.split_off(kept), self.output.split_off(kept));
         for (side, values) in [
@@ -258,19 +258,19 @@ impl Experiment {
     }
 }
 
-fn check_time(time_s: &[f64], rules: &Rules) -> Result<(), DataError> {
+fn check_time(time_s: &[f64], rules: &Rules) -> Result<(), ExperimentError> {
     let falls = time_s.windows(2).position(|pair| pair[1] <= pair[0]);
     if let Some((at, pair)) = falls.and_then(|k| Some((k + 1, time_s.get(k..k + 2)?))) {
-        return Err(DataError::Order { at, before_s: pair[0], time_s: pair[1] });
+        return Err(ExperimentError::Order { at, before_s: pair[0], time_s: pair[1] });
     }
     let step_s = usual_step(time_s).unwrap_or(0.0);
     if !rules.time_is_told && !STEPS_S.contains(&step_s) {
-        return Err(DataError::TimeUnit { step_s });
+        return Err(ExperimentError::TimeUnit { step_s });
     }
     Ok(())
 }
 
-fn bridge(grid: &Grid, rules: &Rules) -> Result<Vec<Note>, DataError> {
+fn bridge(grid: &Grid, rules: &Rules) -> Result<Vec<Note>, ExperimentError> {
     let limit_s = rules.max_gap_s.unwrap_or(grid.usual_limit_s());
     let mut notes = Vec::new();
     if let Some(longest) = grid.longest().copied() {
@@ -278,7 +278,7 @@ fn bridge(grid: &Grid, rules: &Rules) -> Result<Vec<Note>, DataError> {
         let is_long = |gap: &&Gap| gap.length_s > limit_s * (1.0 + 1e-6);
         let count = grid.gaps.iter().filter(is_long).count();
         if count > 0 {
-            return Err(DataError::Gap { gap: longest, count, limit_s });
+            return Err(ExperimentError::Gap { gap: longest, count, limit_s });
         }
         notes.push(Note::Bridged { count: grid.gaps.len(), longest, limit_s });
     } else if grid.is_uneven {
@@ -287,13 +287,13 @@ fn bridge(grid: &Grid, rules: &Rules) -> Result<Vec<Note>, DataError> {
     Ok(notes)
 }
 
-fn check_moves(side: Side, values: &[f64]) -> Result<(), DataError> {
+fn check_moves(side: Side, values: &[f64]) -> Result<(), ExperimentError> {
     let start = (f64::INFINITY, f64::NEG_INFINITY);
     let (low, high) = values.iter().fold(start, |(low, high), v| (low.min(*v), high.max(*v)));
     if high - low > STILL * high.abs().max(low.abs()) {
         return Ok(());
     }
-    Err(DataError::Constant { side, value: low })
+    Err(ExperimentError::Constant { side, value: low })
 }
 
 /// Whether most samples repeat the one before them.

@@ -1,7 +1,7 @@
 //! Fits transfer functions with dead time to samples of an input and an output.
 //!
 //! ```text
-//! Samples::new(input, output, dt) / Samples::at_times(…)
+//! Samples::new(input, output, dt)
 //!   → fit(&samples, &Settings) → Fit{ model, parameters ± errors, quality, … }
 //!   → Fit::validate(&other samples, Before) → Quality
 //! compare(&samples, Some(&validation), &[Settings]) → Comparison{ rows, chosen, reason }
@@ -45,7 +45,7 @@ pub use error::FitError;
 pub use loose::Loose;
 pub use quality::Quality;
 pub use report::{Fit, Note, Parameter};
-pub use samples::{DataError, Samples};
+pub use samples::{Samples, SamplesError};
 pub use settings::{Before, DeadTime, Level, Settings, Structure};
 
 use crate::model::Between;
@@ -54,12 +54,12 @@ use problem::Problem;
 /// Most poles of a fit.
 pub const MOST_POLES: usize = 4;
 
-/// Fits one model. Fails where the data cannot tell one ([`DataError`]) and where
+/// Fits one model. Fails where the data cannot tell one ([`SamplesError`]) and where
 /// the outcome is none ([`FitError`]); every message says what was found.
 pub fn fit(samples: &Samples, settings: &Settings) -> Result<Fit, FitError> {
     settings.check(samples)?;
     samples.check_input(settings.before)?;
-    samples.check_clipped().map_err(DataError::from)?;
+    samples.check_clipped().map_err(SamplesError::from)?;
     let problem = Problem::new(samples, settings);
     let best = start::best(&problem)?;
     let straight_through = settings.structure.zeros() == settings.structure.poles();

@@ -1,7 +1,7 @@
 //! Columns with moments of their own, as a recording has them: each is sampled
 //! when its source spoke. Two of them are brought to the moments of the output.
 
-use super::experiment::{DataError, Experiment, FEWEST_SAMPLES, Rules};
+use super::experiment::{Experiment, ExperimentError, FEWEST_SAMPLES, Rules};
 use super::grid::{Gap, Grid, usual_step};
 
 /// One column.
@@ -107,14 +107,18 @@ impl Series {
 
 /// An input and an output as far as there are both, on the output's grid.
 /// Fails as [`Experiment::new`] does, and on a gap of a measured input.
-pub fn paired(input: &Series, output: &Series, rules: &Rules) -> Result<Experiment, DataError> {
+pub fn paired(
+    input: &Series,
+    output: &Series,
+    rules: &Rules,
+) -> Result<Experiment, ExperimentError> {
     let (Some(&first), Some(&last)) = (input.time_s.first(), input.time_s.last()) else {
-        return Err(DataError::TooFew { got: 0 });
+        return Err(ExperimentError::TooFew { got: 0 });
     };
     let last = if input.is_held { last + usual_step(&input.time_s).unwrap_or(0.0) } else { last };
     let output = output.within(first, last);
     if output.len() < FEWEST_SAMPLES {
-        return Err(DataError::TooFew { got: output.len() });
+        return Err(ExperimentError::TooFew { got: output.len() });
     }
     if !input.is_held {
         check_gaps(input, rules)?;
@@ -126,13 +130,13 @@ pub fn paired(input: &Series, output: &Series, rules: &Rules) -> Result<Experime
     Ok(Experiment { input: input.on(&moments), input_is_held, ..taken })
 }
 
-fn check_gaps(input: &Series, rules: &Rules) -> Result<(), DataError> {
+fn check_gaps(input: &Series, rules: &Rules) -> Result<(), ExperimentError> {
     let Some(grid) = Grid::of(&input.time_s) else { return Ok(()) };
     let limit_s = rules.max_gap_s.unwrap_or(grid.usual_limit_s());
     let too_long = |gap: &&Gap| gap.length_s > limit_s * (1.0 + 1e-6);
     let count = grid.gaps.iter().filter(too_long).count();
     match grid.longest() {
-        Some(gap) if count > 0 => Err(DataError::Gap { gap: *gap, count, limit_s }),
+        Some(gap) if count > 0 => Err(ExperimentError::Gap { gap: *gap, count, limit_s }),
         _ => Ok(()),
     }
 }
@@ -190,6 +194,6 @@ mod tests {
         }
         let apart = Series { time_s: vec![100.0, 101.0], ..series(0.02, 2, false, f64::sin) };
         let refused = paired(&apart, &whole, &Rules::default()).unwrap_err();
-        assert_eq!(refused, DataError::TooFew { got: 0 });
+        assert_eq!(refused, ExperimentError::TooFew { got: 0 });
     }
 }

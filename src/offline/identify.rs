@@ -9,8 +9,8 @@ mod table;
 use crate::identify::experiment::Experiment;
 use crate::identify::file::{self, ModelFile, Setting, Uncertainty};
 use crate::identify::fit::{
-    Before, Comparison, DataError, Fit, FitError, Note, Quality, Row, Samples, Settings, Structure,
-    compare,
+    Before, Comparison, Fit, FitError, Note, Quality, Row, Samples, SamplesError, Settings,
+    Structure, compare,
 };
 use crate::identify::quantity::Quantity;
 use crate::identify::residual::Autocorrelation;
@@ -71,7 +71,7 @@ pub struct Study {
 pub enum Refusal {
     /// The data.
     #[error(transparent)]
-    Data(#[from] DataError),
+    Data(#[from] SamplesError),
     /// None of the forms.
     #[error("no model can be trusted:{}", lines(.0))]
     None(Vec<(String, String)>),
@@ -148,7 +148,7 @@ pub fn study(logs: Logs, forms: &[Settings]) -> Result<Study, Refusal> {
     Ok(study)
 }
 
-fn samples(data: &Experiment) -> Result<Samples, DataError> {
+fn samples(data: &Experiment) -> Result<Samples, SamplesError> {
     let samples = Samples::new(data.input.clone(), data.output.clone(), data.step_s)?;
     samples.check_clipped()?;
     Ok(samples)

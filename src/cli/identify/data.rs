@@ -8,7 +8,7 @@ use super::bead::Bead;
 use super::options::Columns;
 use super::source::Source;
 use crate::cli::WrongArguments;
-use crate::identify::experiment::{DataError, Experiment, Rules, doubt_unit};
+use crate::identify::experiment::{Experiment, ExperimentError, Rules, doubt_unit};
 use crate::identify::hampel::Hampel;
 use crate::identify::quantity::Unit;
 use crate::identify::savgol::SavGol;
@@ -167,10 +167,10 @@ fn check_told(columns: &Columns, known: &[String], name: &str) -> Result<(), Wro
 }
 
 /// The line in the file beside the number of the sample.
-fn at_line(table: &Table, first: usize, name: &str, error: DataError) -> anyhow::Error {
+fn at_line(table: &Table, first: usize, name: &str, error: ExperimentError) -> anyhow::Error {
     let sample = match &error {
-        DataError::Order { at, .. } => Some(*at),
-        DataError::Gap { gap, .. } => Some(gap.after),
+        ExperimentError::Order { at, .. } => Some(*at),
+        ExperimentError::Gap { gap, .. } => Some(gap.after),
         _ => None,
     };
     match sample {

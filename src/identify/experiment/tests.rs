@@ -19,7 +19,7 @@ fn columns() -> [Vec<f64>; 3] {
     [times, input, output]
 }
 
-fn taken(columns: &[Vec<f64>; 3]) -> Result<Experiment, DataError> {
+fn taken(columns: &[Vec<f64>; 3]) -> Result<Experiment, ExperimentError> {
     let [time_s, input, output] = columns;
     Experiment::new(time_s, input, output, &Rules::default())
 }
@@ -44,7 +44,10 @@ fn the_last_part_validates() {
     assert!((rest.start_s - 7.0).abs() < 1e-6);
     let short = taken(&columns()).unwrap().split(0.04).unwrap_err();
     assert!(short.to_string().contains("40 samples are left to validate with: 50"), "{short}");
-    assert!(matches!(taken(&columns()).unwrap().split(0.99), Err(DataError::TooFew { got: 10 })));
+    assert!(matches!(
+        taken(&columns()).unwrap().split(0.99),
+        Err(ExperimentError::TooFew { got: 10 })
+    ));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Why there is no fit.
 
 use super::loose::Loose;
-use super::samples::DataError;
+use super::samples::SamplesError;
 use crate::model::ModelError;
 
 /// Why there is no fit, with what was found.
@@ -9,7 +9,7 @@ use crate::model::ModelError;
 pub enum FitError {
     /// The data themselves.
     #[error(transparent)]
-    Data(#[from] DataError),
+    Data(#[from] SamplesError),
     /// A number of poles and zeros that is not fitted.
     #[error("{poles} poles and {zeros} zeros; give 1 to 4 poles and at most as many zeros")]
     Order {

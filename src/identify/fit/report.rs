@@ -129,7 +129,7 @@ impl Fit {
     pub fn validate(&self, samples: &Samples, before: Before) -> Result<Quality, FitError> {
         let predicted = self.predict(samples, before)?;
         let found = Quality::of(samples.output(), &predicted);
-        found.ok_or(FitError::Data(super::DataError::TooFew { found: 0, needed: 1 }))
+        found.ok_or(FitError::Data(super::SamplesError::TooFew { found: 0, needed: 1 }))
     }
 }
 

@@ -11,7 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::identify::fit::{
-    Before, DataError, DeadTime, FitError, Level, Samples, Settings, Structure, fit,
+    Before, DeadTime, FitError, Level, Samples, SamplesError, Settings, Structure, fit,
 };
 use crate::identify::prbs::{NoSuchLength, Prbs};
 use crate::model::{Between, ModelError, simulate};
@@ -74,7 +74,7 @@ pub enum FitTableError {
     Fit(#[from] FitError),
     /// The simulated samples.
     #[error(transparent)]
-    Data(#[from] DataError),
+    Data(#[from] SamplesError),
     /// The excitation.
     #[error(transparent)]
     Sequence(#[from] NoSuchLength),
