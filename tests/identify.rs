@@ -154,6 +154,10 @@ fn profiles_are_written_as_a_cell_plays_them() {
     assert!(unit.contains("ends with its unit"), "{unit}");
     let endless = said(&mut excite("gaussian --low 2 --high 4 --hold-s 1 --quantity drive_v"), 2);
     assert!(endless.contains("tell --duration-s"), "{endless}");
+    let one = said(&mut excite("steps --levels 20 --hold-s 15 --quantity rpm"), 2);
+    assert!(one.contains("1 level: a step takes two"), "{one}");
+    let same = said(&mut excite("steps --levels 20,20 --hold-s 15 --quantity rpm"), 2);
+    assert!(same.contains("20 from the beginning to the end"), "{same}");
     let flat = said(&mut excite("prbs --low 4 --high 4 --hold-s 1 --quantity rpm"), 2);
     assert!(flat.contains("levels from 4 to 4"), "{flat}");
 }
@@ -201,6 +205,16 @@ fn columns_that_tell_nothing() {
     let clipped = |lines: &mut Vec<String>| each(lines, |_, [t, r, flow]| [t, r, flow.min(570.0)]);
     let said = refused(clipped, &[]);
     assert!(said.contains("the output is cut off") && said.contains("570"), "{said}");
+    let cut = |lines: &mut Vec<String>| {
+        each(lines, |k, [t, _, flow]| {
+            let k = f64::from(u32::try_from(k).unwrap());
+            [t, (30.0 + 9.0 * (0.05 * k).sin() + 5.0 * (0.13 * k).sin()).clamp(25.0, 35.0), flow]
+        });
+    };
+    let said = refused(cut, &[]);
+    assert!(said.contains("the input is cut off") && said.contains("value, 25, in"), "{said}");
+    let said = refused(|lines| each(lines, |_, [t, rpm, _]| [t, rpm, rpm]), &[]);
+    assert!(said.contains("the same from sample to sample"), "{said}");
     let said = refused(|lines| lines.truncate(40), &[]);
     assert!(said.contains("39 samples: a model takes 50 or more"), "{said}");
     let said = refused(|_| {}, &["--validate-share", "0.005"]);
@@ -243,6 +257,8 @@ fn arguments_that_are_wrong() {
         columns.contains("no column screw; the columns are time_s, screw_rpm, flow_mm3_per_s"),
         "{columns}"
     );
+    let same = said(&mut other("flow_mm3_per_s"), 2);
+    assert!(same.contains("are both flow_mm3_per_s"), "{same}");
     for (more, expected) in [
         (["--model", "1,2"], "no more zeros than poles"),
         (["--hampel", "0,3"], "half width of 0"),
@@ -252,6 +268,11 @@ fn arguments_that_are_wrong() {
         (["--validate-share", "0.95"], "expected 0 to 0.9"),
         (["--validate", "none.csv"], "none.csv"),
         (["--nozzle-mm", "0"], "0.01 to 1000"),
+        (["--nozzle-mm", "-1"], "0.01 to 1000"),
+        (["--dead-time-s", "-1"], "expected 0 to 10000 s, a range of them"),
+        (["--dead-time-s", "-1..2"], "expected 0 to 10000 s, a range of them"),
+        (["--max-gap-s", "-1"], "expected 0 to 10000 s"),
+        (["--validate", log.to_str().unwrap()], "the data that the model is fitted to"),
     ] {
         let said = said(other("screw_rpm").args(more), 2);
         assert!(said.contains(expected), "{more:?}: {said}");

@@ -71,7 +71,7 @@ struct GaussianArgs {
     mean: Option<f64>,
     /// Standard deviation
     /// [default: a sixth of the way from the smallest to the largest level]
-    #[arg(long)]
+    #[arg(long, allow_hyphen_values = true)]
     sigma: Option<f64>,
     /// The same seed gives the same levels
     #[arg(long, default_value_t = 1)]
@@ -93,17 +93,17 @@ struct StepsArgs {
 #[derive(Debug, Args)]
 struct All {
     /// How long each level is held; the bit time of a sequence [s]
-    #[arg(long, alias = "bit-s", value_name = "S")]
+    #[arg(long, alias = "bit-s", value_name = "S", allow_hyphen_values = true)]
     hold_s: f64,
     /// How long it lasts, without what is before and after [s]
     /// [default: one period of a sequence, each of the steps once]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
     duration_s: Option<f64>,
     /// Time at the middle level (steps: the first one) before it [s]
-    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    #[arg(long, value_name = "S", default_value_t = 0.0, allow_hyphen_values = true)]
     lead_in_s: f64,
     /// The same after it [s]
-    #[arg(long, value_name = "S", default_value_t = 0.0)]
+    #[arg(long, value_name = "S", default_value_t = 0.0, allow_hyphen_values = true)]
     lead_out_s: f64,
     /// What is commanded: the column's name, which ends with its unit (see the examples)
     #[arg(long, value_name = "NAME")]

@@ -7,7 +7,7 @@ mod list;
 mod options;
 mod source;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
@@ -74,14 +74,20 @@ pub struct IdentifyArgs {
     #[arg(long, value_name = "FORM", value_parser = parse_forms, default_value = "compare")]
     model: Vec<Forms>,
     /// Dead time [s]: a number, a range to look in such as 0..3, or estimate
-    #[arg(long, value_name = "S", value_parser = parse_dead_time, default_value = "estimate")]
+    #[arg(
+        long,
+        value_name = "S",
+        value_parser = parse_dead_time,
+        default_value = "estimate",
+        allow_hyphen_values = true
+    )]
     dead_time_s: Wanted,
     /// Data to validate with, of the same columns
     #[arg(long, value_name = "OTHER", conflicts_with = "validate_share")]
     validate: Option<PathBuf>,
     /// Share at the end of the data that is kept to validate with; 0 for none
     /// [default: 0.3]
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     validate_share: Option<f64>,
     /// The data begin at rest: the input had stood at its first value for long
     #[arg(long)]
@@ -97,10 +103,10 @@ pub struct IdentifyArgs {
     #[arg(long)]
     material: Option<String>,
     /// Diameter of the nozzle that it holds for [mm]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     nozzle_mm: Option<f64>,
     /// Temperature of the material that it holds for [°C]
-    #[arg(long, value_name = "C")]
+    #[arg(long, value_name = "C", allow_negative_numbers = true)]
     temperature_c: Option<f64>,
     /// Folder for model.toml, report.html and identify.json
     /// [default: model, or the first of model-2, model-3 … that is free]
@@ -142,7 +148,7 @@ pub fn run(args: &IdentifyArgs) -> Result<()> {
     Ok(())
 }
 
-fn write(found: &Study, setting: Setting, folder: &std::path::Path) -> Result<()> {
+fn write(found: &Study, setting: Setting, folder: &Path) -> Result<()> {
     make_folder(folder)?;
     let notes = [
         format!("Fitted by truebead {} to {}.", env!("CARGO_PKG_VERSION"), found.logs.source),
@@ -154,6 +160,16 @@ fn write(found: &Study, setting: Setting, folder: &std::path::Path) -> Result<()
     write_whole(folder, "identify.json", &json)?;
     write_whole(folder, "report.html", page(found).as_bytes())?;
     Ok(())
+}
+
+fn validates_with_itself(other: &Path) -> anyhow::Error {
+    let what = format!(
+        "--validate {}: these are the data that the model is fitted to, and a model foretells those \
+         whatever it is worth; name another log, or leave --validate out: the last part of the data \
+         is kept for it then",
+        other.display()
+    );
+    WrongArguments::new(what).into()
 }
 
 impl IdentifyArgs {
@@ -192,6 +208,13 @@ impl IdentifyArgs {
                         without either it lists the columns";
             return Err(WrongArguments::new(what).into());
         };
+        if input == output {
+            let what = format!(
+                "--input and --output are both {input}: a model tells the one from the other; name \
+                 what the extruder is told, and what comes of it"
+            );
+            return Err(WrongArguments::new(what).into());
+        }
         let filters = data::Filters { hampel: self.hampel, smooth: self.smooth };
         let request = data::Request { columns: &self.columns, bead: &self.bead, filters };
         let read = |path| data::read(path, &request);
@@ -205,6 +228,9 @@ impl IdentifyArgs {
         let (estimation, validation) = match &self.validate {
             Some(other) => {
                 let (rest, more) = read(other)?;
+                if (&rest.input, &rest.output) == (&log.input, &log.output) {
+                    return Err(validates_with_itself(other));
+                }
                 doubts.extend(
                     more.into_iter().filter(|doubt| !doubts.contains(doubt)).collect::<Vec<_>>(),
                 );

@@ -29,13 +29,19 @@ pub struct ModelsArgs {
     #[arg(long, requires = "nozzle_mm", requires = "temperature_c")]
     material: Option<String>,
     /// Diameter of the nozzle [mm]
-    #[arg(long, value_name = "MM", requires = "material")]
+    #[arg(long, value_name = "MM", requires = "material", allow_negative_numbers = true)]
     nozzle_mm: Option<f64>,
     /// Temperature of the material [°C]
-    #[arg(long, value_name = "C", requires = "material")]
+    #[arg(long, value_name = "C", requires = "material", allow_negative_numbers = true)]
     temperature_c: Option<f64>,
     /// How far a model's temperature may be off [°C]
-    #[arg(long, value_name = "C", default_value_t = TOLERANCE_C, requires = "material")]
+    #[arg(
+        long,
+        value_name = "C",
+        default_value_t = TOLERANCE_C,
+        requires = "material",
+        allow_negative_numbers = true
+    )]
     tolerance_c: f64,
     /// Unit of the model's input, as a column's name ends with it
     #[arg(long, value_name = "UNIT", value_parser = parse_unit, requires = "material")]

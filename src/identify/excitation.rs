@@ -57,10 +57,19 @@ pub enum ExcitationError {
         duration_s: f64,
     },
     /// Stairs without steps.
-    #[error("{got} levels: a step takes two")]
+    #[error("{got} level{}: a step takes two", if *.got == 1 { "" } else { "s" })]
     Steps {
         /// Levels that were given.
         got: usize,
+    },
+    /// One level from the beginning to the end.
+    #[error(
+        "{value} from the beginning to the end: a model can be told only from an input that changes; \
+         give levels that differ, and time for more than one of them"
+    )]
+    Still {
+        /// The level.
+        value: f64,
     },
     /// Something else that is no profile.
     #[error(transparent)]
@@ -123,6 +132,11 @@ impl Excitation {
             reason = "checked to be 1 to a million"
         )]
         let values = self.shape.levels(count as u32)?;
+        if let Some(value) =
+            values.first().copied().filter(|first| values.iter().all(|v| v == first))
+        {
+            return Err(ExcitationError::Still { value });
+        }
         let points = (0_u32..).zip(values);
         let points =
             points.map(|(k, value)| Point { from_s: f64::from(k) * hold_s, value }).collect();
@@ -276,7 +290,12 @@ mod tests {
         assert!(said(gaussian(0.0)).contains("standard deviation 0"));
         assert!(said(gaussian(f64::NAN)).contains("standard deviation NaN"));
         let level = Excitation { shape: Shape::Stairs(vec![1.0]), hold_s: 1.0, duration_s: None };
-        assert_eq!(said(level), "1 levels: a step takes two");
+        assert_eq!(said(level), "1 level: a step takes two");
+        for (levels, duration_s) in [(vec![3.0, 3.0], None), (vec![3.0, 4.0], Some(0.5))] {
+            let shape = Shape::Stairs(levels);
+            let still = said(Excitation { shape, hold_s: 1.0, duration_s });
+            assert!(still.starts_with("3 from the beginning to the end"), "{still}");
+        }
         let shape = Shape::Prbs { bits: 7, low: 4.0, high: 4.0 };
         let flat = Excitation { shape, hold_s: 1.0, duration_s: None };
         assert!(said(flat).contains("levels from 4 to 4"));

@@ -97,6 +97,12 @@ pub enum ExperimentError {
         /// Its value.
         value: f64,
     },
+    /// One column twice.
+    #[error(
+        "input and output are the same from sample to sample: a model tells the one from the other. \
+         Was a command logged in place of what came of it?"
+    )]
+    Same,
     /// A part that tells nothing.
     #[error("{got} samples are left to validate with: {FEWEST_SAMPLES} or more are needed")]
     ShortValidation {
@@ -189,6 +195,9 @@ impl Experiment {
         let notes = bridge(&grid, rules)?;
         for (side, values) in [(Side::Input, input), (Side::Output, output)] {
             check_moves(side, values)?;
+        }
+        if input == output {
+            return Err(ExperimentError::Same);
         }
         let input_is_held = is_held(input);
         let (input, output) = if grid.is_uneven {

@@ -30,7 +30,7 @@ pub struct Columns {
     pub unit: Vec<Told>,
     /// Longest gap in time that is bridged by a straight line [s]
     /// [default: five steps]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = parse_gap, allow_negative_numbers = true)]
     pub max_gap_s: Option<f64>,
     /// Leave out what was logged before this moment [s]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
@@ -193,9 +193,15 @@ pub fn parse_dead_time(text: &str) -> Result<Wanted, String> {
             .map(|(least_s, most_s)| DeadTime::Estimated { least_s, most_s }),
         None => number(text).map(DeadTime::Given),
     };
-    wanted
-        .map(|wanted| Wanted(Some(wanted)))
-        .ok_or_else(|| "expected seconds, a range such as 0..3, or estimate".to_owned())
+    wanted.map(|wanted| Wanted(Some(wanted))).ok_or_else(|| {
+        "expected 0 to 10000 s, a range of them such as 0..3, or estimate".to_owned()
+    })
+}
+
+/// A gap that is bridged.
+fn parse_gap(text: &str) -> Result<f64, String> {
+    let gap = text.trim().parse::<f64>().ok().filter(|s| (0.0..=1e4).contains(s));
+    gap.ok_or_else(|| "expected 0 to 10000 s".to_owned())
 }
 
 /// K,T.

@@ -124,6 +124,13 @@ fn constant_columns() {
 }
 
 #[test]
+fn one_column_twice() {
+    let [times, input, _] = columns();
+    let said = refusal(&[times, input.clone(), input]);
+    assert!(said.contains("the same from sample to sample"), "{said}");
+}
+
+#[test]
 fn bar_that_is_called_megapascal() {
     let said = doubt_unit("nozzle_mpa", Unit::MPa, &[12.0, -230.0]).unwrap();
     assert!(said.contains("up to 230 MPa") && said.contains("--unit nozzle_mpa=bar"), "{said}");
