@@ -173,3 +173,46 @@ fn check_says_what_a_cell_suffices_for_and_what_is_missing() {
     assert!(runs.contains("suffices for run\n"), "{runs}");
     assert!(runs.contains("not for simulate;") && runs.contains("extruder_plant"), "{runs}");
 }
+
+/// Simulates the shipped cell with the model's inverse, some lines changed.
+fn foreseen(changes: &[(&str, &str)]) -> serde_json::Value {
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
+    let mut text = include_str!("../cells/extruder-feedforward.toml")
+        .replace("../models", &models.display().to_string());
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from}");
+        text = text.replace(from, to);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("cell.toml"), text).unwrap();
+    let output = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let summary = fs::read_to_string(folder.path().join("out/summary.json")).unwrap();
+    serde_json::from_str(&summary).unwrap()
+}
+
+#[test]
+fn a_robot_that_goes_by_the_flow_has_its_width_while_the_extruder_runs_up() {
+    let since_control =
+        |summary: &serde_json::Value| summary["width_error_rms_mm"].as_f64().unwrap();
+    let alone = foreseen(&[("robot_follows = \"flow\"", "robot_follows = \"nothing\"")]);
+    let with = foreseen(&[]);
+    assert!(since_control(&with) < 0.08, "{with}");
+    assert!(2.0 * since_control(&with) < since_control(&alone), "{with} {alone}");
+    // A screw that follows late is known by its encoder.
+    let plant = "start_delay_s = 0.1";
+    let late = format!("{plant}\nscrew_lag_s = 0.3");
+    let blind = foreseen(&[(plant, &late)]);
+    let key = "robot_follows = \"flow\"";
+    let seen = foreseen(&[(plant, &late), (key, &format!("{key}\nforetold_from = \"encoder\""))]);
+    assert!(since_control(&seen) < 0.75 * since_control(&blind), "{seen} {blind}");
+}
+
+#[test]
+fn a_robot_and_a_flow_do_not_follow_each_other() {
+    let flow = "follows = \"robot\"\nrobot_follows = \"flow\"\nmax_gap_s = 0.2 ";
+    let (status, said, _) = simulated(&[("max_gap_s = 0.2 ", flow)]);
+    assert_eq!(status, Some(2));
+    assert!(said.contains("extruder.follows"), "{said}");
+    assert!(said.contains("expected strategy = \"feedforward\""), "{said}");
+}

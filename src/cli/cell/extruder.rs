@@ -114,10 +114,10 @@ fn foreseen(
     };
     let tracker = Tracker::new(&model.transfer, &settings)
         .map_err(|error| wrong(cell, &error.to_string()))?;
-    let law = Foreseen::new(tracker, OperatingPoint { command, flow_mm3_per_s }, keys.driven_by);
+    let law = Foreseen::new(tracker, OperatingPoint { command, flow_mm3_per_s });
     let forecast = forecast(model.transfer, run.robot.rate_hz, settings.period)
         .map_err(|error| wrong(cell, &error.to_string()))?;
-    Ok(law.foretelling(forecast))
+    Ok(law.foretelling(forecast, keys.foretold_from))
 }
 
 /// What will flow when a setpoint of the robot that is given now has stood for

@@ -80,7 +80,7 @@ fn compare(extruder: &Extruder, table: &Table<'_>, kind: &PlantKind, plant_table
         Strategy::Pressure(_) => Some(Need::Pressure),
         Strategy::Screw(_) => Some(Need::Filled),
         Strategy::Adaptive(_) => Some(Need::Flow),
-        Strategy::Feedforward(ref keys) => keys.driven_by.need(),
+        Strategy::Feedforward(ref keys) => keys.foretold_from.need(),
         Strategy::Constant { .. } | Strategy::Profile { .. } => None,
     };
     let limited = extruder.max_pressure.map(|_| Need::Pressure);

@@ -7,7 +7,7 @@ use crate::config::table::Table;
 use crate::extruder::Drive;
 use crate::extruder::adaptive::Law as AdaptiveLaw;
 use crate::extruder::feedforward::RightZeros;
-use crate::extruder::law::{DrivenBy, NozzleModel, PressureSettings};
+use crate::extruder::law::{ForetoldFrom, NozzleModel, PressureSettings};
 use crate::extruder::screw::control::ScrewSettings;
 use crate::identify::library::{TOLERANCE_C, Wanted};
 use crate::identify::quantity::Unit;
@@ -47,8 +47,8 @@ pub struct FeedforwardKeys {
     pub late: Span,
     /// What becomes of zeros in the right half plane.
     pub right_zeros: RightZeros,
-    /// What drives the model.
-    pub driven_by: DrivenBy,
+    /// What the flow is foretold from.
+    pub foretold_from: ForetoldFrom,
 }
 
 /// Where a model comes from.
@@ -136,18 +136,20 @@ fn read_feedforward(table: &Table<'_>, about: &About<'_>) -> Option<FeedforwardK
     let late = table.number_or("late_s", 0.0..=60.0, 0.0);
     let right_zeros = table
         .choice("right_zeros", &[("refuse", RightZeros::Refuse), ("mirror", RightZeros::Mirror)]);
-    let driven_by = table
-        .choice("model_input", &[("command", DrivenBy::Command), ("encoder", DrivenBy::Encoder)]);
-    if driven_by == Some(DrivenBy::Encoder) && about.drive != Drive::Rpm {
+    let foretold_from = table.choice(
+        "foretold_from",
+        &[("command", ForetoldFrom::Command), ("encoder", ForetoldFrom::Encoder)],
+    );
+    if foretold_from == Some(ForetoldFrom::Encoder) && about.drive != Drive::Rpm {
         let expected = "\"command\", or command = \"rpm\", which is what an encoder reports";
-        table.report("model_input", "\"encoder\"", expected);
+        table.report("foretold_from", "\"encoder\"", expected);
     }
     Some(FeedforwardKeys {
         model: model?,
         time_constant_s: time_constant?,
         late: Span::from_secs(late?),
         right_zeros: right_zeros?,
-        driven_by: driven_by?,
+        foretold_from: foretold_from?,
     })
 }
 

@@ -16,9 +16,10 @@ pub struct OperatingPoint {
     pub flow_mm3_per_s: f64,
 }
 
-/// What turns the model.
+/// What the flow is foretold from. The inverse itself goes by the command: a
+/// drive that is late would make a loop of it through the encoder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DrivenBy {
+pub enum ForetoldFrom {
     /// The command as it was applied.
     Command,
     /// The screw as its encoder reports it, in place of a model of the drive
@@ -26,7 +27,7 @@ pub enum DrivenBy {
     Encoder,
 }
 
-impl DrivenBy {
+impl ForetoldFrom {
     /// The reading that takes.
     pub const fn need(self) -> Option<Need> {
         match self {
@@ -42,11 +43,8 @@ impl DrivenBy {
 pub struct Foreseen {
     tracker: Tracker,
     about: OperatingPoint,
-    driven_by: DrivenBy,
     outlook: Option<Outlook>,
     applied: f64,
-    /// Speed of the screw in the last report \[rpm\].
-    turning: Option<f64>,
     command: f64,
 }
 
@@ -54,20 +52,24 @@ pub struct Foreseen {
 #[derive(Debug, Clone, PartialEq)]
 struct Outlook {
     forecast: FlowForecast,
+    from: ForetoldFrom,
+    /// Speed of the screw in the last report \[rpm\].
+    turning: Option<f64>,
     flow: Mm3PerS,
 }
 
 impl Foreseen {
-    /// Before its first bead. Tracker and forecast take and give differences
-    /// from the operating point.
-    pub const fn new(tracker: Tracker, about: OperatingPoint, driven_by: DrivenBy) -> Self {
-        Self { tracker, about, driven_by, outlook: None, applied: 0.0, turning: None, command: 0.0 }
+    /// Before its first bead. The tracker takes and gives differences from the
+    /// operating point.
+    pub const fn new(tracker: Tracker, about: OperatingPoint) -> Self {
+        Self { tracker, about, outlook: None, applied: 0.0, command: 0.0 }
     }
 
-    /// The same, which also says what will flow. The forecast is from what
-    /// drives the model to the flow.
-    pub fn foretelling(mut self, forecast: FlowForecast) -> Self {
-        self.outlook = Some(Outlook { forecast, flow: Mm3PerS::ZERO });
+    /// The same, which also says what will flow. The forecast takes the command
+    /// or the screw's speed, and gives flow, as differences from the operating
+    /// point.
+    pub fn foretelling(mut self, forecast: FlowForecast, from: ForetoldFrom) -> Self {
+        self.outlook = Some(Outlook { forecast, from, turning: None, flow: Mm3PerS::ZERO });
         self
     }
 
@@ -75,41 +77,50 @@ impl Foreseen {
         let off = flow.get() - self.about.flow_mm3_per_s;
         self.command = self.about.command + self.tracker.command(off);
     }
+}
 
-    /// What drives the model now, as a difference from the operating point.
-    fn driven(&self) -> f64 {
-        let driven = match self.driven_by {
-            DrivenBy::Command => self.applied,
-            DrivenBy::Encoder => self.turning.unwrap_or(self.applied),
+impl Outlook {
+    /// The pump stands, and nothing flows.
+    fn begin(&mut self, about: &OperatingPoint) {
+        // Only a model without a steady state has none to begin from, and such a
+        // one was refused.
+        let _ = self.forecast.start(-about.command);
+        (self.turning, self.flow) = (None, Mm3PerS::ZERO);
+    }
+
+    fn pass(&mut self, applied: f64, about: &OperatingPoint) {
+        let driven = match self.from {
+            ForetoldFrom::Command => applied,
+            ForetoldFrom::Encoder => self.turning.unwrap_or(applied),
         };
-        driven - self.about.command
+        let off = self.forecast.step(driven - about.command, None).get();
+        let flow = (about.flow_mm3_per_s + off).max(0.0);
+        self.flow = Mm3PerS::new(flow).unwrap_or_default();
     }
 }
 
 impl Strategy for Foreseen {
     fn needs(&self) -> &'static [Need] {
-        match self.driven_by {
-            DrivenBy::Command => &[],
-            DrivenBy::Encoder => &[Need::Screw],
+        match self.outlook.as_ref().and_then(|outlook| outlook.from.need()) {
+            Some(Need::Screw) => &[Need::Screw],
+            _ => &[],
         }
     }
 
     fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> Wish {
-        // The pump stands, and nothing flows.
-        (self.applied, self.turning) = (0.0, None);
+        self.applied = 0.0;
         self.tracker.start(-self.about.command);
-        if let Some(Outlook { forecast, flow }) = &mut self.outlook {
-            // Only a model without a steady state has none to begin from, and
-            // such a one was refused.
-            let _ = forecast.start(-self.about.command);
-            *flow = Mm3PerS::ZERO;
+        if let Some(outlook) = &mut self.outlook {
+            outlook.begin(&self.about);
         }
         self.aim(flow);
         self.wish()
     }
 
     fn hear(&mut self, _now: Stamp, report: &ExtruderReport) -> Result<(), Unusable> {
-        self.turning = report.screw_rpm.map(f64::from);
+        if let Some(outlook) = &mut self.outlook {
+            outlook.turning = report.screw_rpm.map(f64::from);
+        }
         Ok(())
     }
 
@@ -119,11 +130,9 @@ impl Strategy for Foreseen {
     }
 
     fn wait(&mut self, _dt: Span) {
-        let driven = self.driven();
-        self.tracker.pass(driven);
-        if let Some(Outlook { forecast, flow }) = &mut self.outlook {
-            let told = forecast.step(driven, None).get() + self.about.flow_mm3_per_s;
-            *flow = Mm3PerS::new(told.max(0.0)).unwrap_or_default();
+        self.tracker.pass(self.applied - self.about.command);
+        if let Some(outlook) = &mut self.outlook {
+            outlook.pass(self.applied, &self.about);
         }
     }
 
@@ -152,6 +161,7 @@ mod tests {
     use super::*;
     use crate::extruder::CommandLimits;
     use crate::extruder::feedforward::{ExtruderModel, InverseSettings, RightZeros, ScrewSpeed};
+    use crate::extruder::law::tests::report;
     use crate::model::{Between, Simulator, TransferFunction};
     use crate::units::Rpm;
 
@@ -171,7 +181,7 @@ mod tests {
             limits,
             period: PERIOD,
         };
-        Foreseen::new(Tracker::new(model, &settings).unwrap(), about, DrivenBy::Command)
+        Foreseen::new(Tracker::new(model, &settings).unwrap(), about)
     }
 
     /// Shares of a wanted flow over time, and the commands.
@@ -237,34 +247,34 @@ mod tests {
         assert!(most < 1.03, "{most}");
     }
 
+    fn forecast(model: &TransferFunction, ahead: Span) -> FlowForecast {
+        let drive = TransferFunction::gain(1.0).unwrap();
+        let whole = ExtruderModel { drive, flow: model.clone() };
+        FlowForecast::new(&whole, ScrewSpeed::Modelled, ahead, PERIOD).unwrap()
+    }
+
     #[test]
-    fn an_encoder_takes_the_place_of_the_drives_model() {
-        // The screw turns 20 % slower than it is told: the model knows, and tells
-        // more, until it is told what the flow needs.
+    fn an_encoder_tells_of_a_drive_that_no_model_knows() {
+        // The screw turns a quarter less than it is told.
         let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
         let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
-        let mut law = law(&model, limits, OperatingPoint::default(), 0.1);
-        law.driven_by = DrivenBy::Encoder;
-        assert_eq!(law.needs(), [Need::Screw]);
-        let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
-        let mut told = law.begin(Stamp::START, Mm3PerS::constant(480.0)).value;
-        let mut flow = 0.0;
-        for _ in 0..2000 {
-            law.settle(Stamp::START, told);
-            flow = plant.step(0.8 * told);
-            let report = ExtruderReport {
-                screw_rpm: Some(Rpm::new(0.8 * told).unwrap()),
-                ..crate::extruder::law::tests::report()
-            };
-            law.hear(Stamp::START, &report).unwrap();
-            law.foresee(PERIOD, Mm3PerS::constant(480.0));
-            told = law.wish().value;
-        }
-        // u = (d − (1 − λ/τ)·0.8·u)·τ/λ in the steady state, λ/τ = 0.1/0.84.
-        let share = 0.1 / 0.84;
-        let expected = 480.0 / (share + (1.0 - share) * 0.8) * 0.8;
-        assert!((flow - expected).abs() < 0.5, "{flow} {expected}");
-        assert!(flow > 0.97 * 480.0, "{flow}");
+        let told_of = |from: ForetoldFrom| {
+            let mut law = law(&model, limits, OperatingPoint::default(), 0.1)
+                .foretelling(forecast(&model, Span::ZERO), from);
+            let mut told = law.begin(Stamp::START, Mm3PerS::constant(480.0)).value;
+            for _ in 0..2000 {
+                law.settle(Stamp::START, told);
+                let screw_rpm = Some(Rpm::new(0.75 * told).unwrap());
+                law.hear(Stamp::START, &ExtruderReport { screw_rpm, ..report() }).unwrap();
+                law.foresee(PERIOD, Mm3PerS::constant(480.0));
+                told = law.wish().value;
+            }
+            (law.needs().len(), law.foretold().unwrap().get())
+        };
+        let (needs, flow) = told_of(ForetoldFrom::Encoder);
+        assert!(needs == 1 && (flow - 360.0).abs() < 0.1, "{needs} {flow}");
+        let (needs, flow) = told_of(ForetoldFrom::Command);
+        assert!(needs == 0 && (flow - 480.0).abs() < 0.1, "{needs} {flow}");
     }
 
     #[test]
@@ -272,11 +282,9 @@ mod tests {
         let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.2).unwrap();
         let limits = CommandLimits::new(0.0, 60.0, 1e6).unwrap();
         let about = OperatingPoint { command: 30.0, flow_mm3_per_s: 360.0 };
-        let whole =
-            ExtruderModel { drive: TransferFunction::gain(1.0).unwrap(), flow: model.clone() };
         let ahead = Span::from_millis(100);
-        let forecast = FlowForecast::new(&whole, ScrewSpeed::Modelled, ahead, PERIOD).unwrap();
-        let mut law = law(&model, limits, about, 0.25).foretelling(forecast);
+        let mut law = law(&model, limits, about, 0.25)
+            .foretelling(forecast(&model, ahead), ForetoldFrom::Command);
         let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
         let mut told = law.begin(Stamp::START, Mm3PerS::constant(480.0)).value.min(60.0);
         assert_eq!(law.foretold(), Some(Mm3PerS::ZERO));

@@ -233,11 +233,7 @@ fn foreseen() -> (Supervisor, Box<dyn Machine>) {
         limits,
         period: TICK,
     };
-    let law = Foreseen::new(
-        Tracker::new(&model, &settings).unwrap(),
-        OperatingPoint::default(),
-        DrivenBy::Command,
-    );
+    let law = Foreseen::new(Tracker::new(&model, &settings).unwrap(), OperatingPoint::default());
     let side = supervisor(Drive::Rpm, Law::Feedforward(Box::new(law)), limits);
     (side, Box::new(Lagging::new(12.0, 0.84)))
 }
