@@ -13,6 +13,7 @@ use super::{Voice, WITH_LOSS, outcome};
 use crate::config::cell::{KeepFrames, Purpose};
 use crate::control::{Event, Step};
 use crate::io::record::{self, RecordConfig, RecorderHandle};
+use crate::io::stop::StopSignal;
 use crate::offline::{
     ControlColumns, ControlFacts, FrameRow, LogError, LogOptions, Note, Progress, RunLog,
 };
@@ -30,8 +31,8 @@ Example:
 The scenario is a cell file; [bead], [render] and [simulation] say what is
 simulated. One bead of [simulation] path_mm is laid. level = \"frames\" renders
 and measures every frame; level = \"widths\" takes the true width with noise and
-is thousands of times faster than the clock. Leaves widths.csv, summary.json
-and report.html; with --record also recording.mcap, which identify and viewers of
+is thousands of times faster than the clock. Ctrl-C ends it with what there is by
+then. Leaves widths.csv, summary.json and report.html; with --record also recording.mcap, which identify and viewers of
 MCAP read.")]
 pub struct SimulateArgs {
     /// Cell file that describes cell, bead and world
@@ -59,6 +60,7 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     let calibration = loaded.calibration.clone();
     let recorder = SimRecorder::of(args, &loaded)?;
     let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, recorder, extruder)?;
+    let stop = StopSignal::install().context("cannot wait for signals")?;
     let log = RunLog::create(LogOptions {
         folder: args.out.clone(),
         title: format!("Simulation of {}", args.scenario.display()),
@@ -73,10 +75,11 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
         control: Some(ControlFacts::of(&run, law.as_ref())),
     })?;
     let progress = Progress::new("simulating", "s", None, voice.quiet);
-    let mut logger = Logger { log, failed: None, progress };
+    let mut logger = Logger { log, stop, failed: None, progress };
     #[expect(clippy::disallowed_methods, reason = "how much faster than the clock")]
     let began = Instant::now();
     let end = sim.layer(Mm::ZERO, &mut logger);
+    let interrupted = logger.stop.asked() && !end.whole;
     let took_s = began.elapsed().as_secs_f64();
     logger.progress.finish();
     if let Some(error) = logger.failed {
@@ -91,6 +94,10 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
         end.took.secs() / took_s.max(1e-9)
     );
     say!("report     {}", args.out.join("report.html").display());
+    if interrupted {
+        tell!("ended before the bead was; the results hold what was simulated until then");
+        return Ok(ExitCode::SUCCESS);
+    }
     Ok(status(&loaded, &summary, end))
 }
 
@@ -143,6 +150,7 @@ fn status(loaded: &LoadedCell, summary: &crate::offline::Summary, end: LayerEnd)
 /// Takes the simulation down.
 struct Logger {
     log: RunLog,
+    stop: StopSignal,
     failed: Option<LogError>,
     progress: Progress,
 }
@@ -159,6 +167,11 @@ impl Witness for Logger {
             reason = "simulated seconds"
         )]
         self.progress.set(now.secs() as u64);
+    }
+
+    fn has_seen_enough(&self) -> bool {
+        // What cannot be written is not simulated to its end either.
+        self.failed.is_some() || self.stop.asked()
     }
 
     fn flow(&mut self, now: Stamp, wanted: Option<Mm3PerS>, flow: Mm3PerS) {

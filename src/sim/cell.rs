@@ -4,14 +4,16 @@
 //! sent, and last the extruder side takes its step.
 
 mod camera;
+mod clock;
 mod port;
+mod witness;
 
 use crate::calib::Calibration;
 use crate::config::Cell;
 use crate::config::cell::RunPart;
-use crate::control::{Command, Event, RobotMode, Step};
+use crate::control::{Command, Event, RobotMode};
 use crate::controller::{Controller, Setup};
-use crate::extruder::{ExtruderReport, ExtruderSetup, ExtruderState, FlowDemand};
+use crate::extruder::{ExtruderSetup, ExtruderState, FlowDemand};
 use crate::link::{ParamError, RobotCell, RobotParams};
 use crate::ports::Recorder;
 use crate::runner::{Handled, Runner};
@@ -24,7 +26,10 @@ use super::laid::LaidBead;
 use super::render::RenderError;
 
 pub use camera::Sight;
+pub use witness::{Deaf, Witness};
+
 use camera::SimCamera;
+use clock::{Ticker, What};
 use port::SimPort;
 
 /// A robot that stops for this long has finished.
@@ -50,19 +55,6 @@ pub struct Rig {
     pub plant: SimExtruder,
     /// Flow at which the bead is as wide as its model says.
     pub nominal_flow: Mm3PerS,
-}
-
-/// Is told what happens in a simulated cell.
-pub trait Witness {
-    /// An event and the controller's answer.
-    fn step(&mut self, now: Stamp, event: &Event, step: &Step);
-
-    /// What the camera saw; comes after the step that answered it.
-    fn look(&mut self, sight: &Sight<'_>);
-
-    /// The flow through the nozzle of an extruder that is commanded, and the
-    /// one that is wanted while bead is laid.
-    fn flow(&mut self, _now: Stamp, _wanted: Option<Mm3PerS>, _flow: Mm3PerS) {}
 }
 
 /// A cell that cannot be simulated.
@@ -184,7 +176,8 @@ impl<K: Recorder> SimCell<K> {
     }
 
     /// Lays one bead from start to end with the nozzle at a height, and tells
-    /// a witness everything. Ends early when the robot stops.
+    /// a witness everything. Ends early when the robot stops, and when the
+    /// witness has seen enough.
     pub fn layer(&mut self, z: Mm, witness: &mut impl Witness) -> LayerEnd {
         self.bead = Self::fresh_bead(&self.cell, self.layers);
         self.bead_start = self.runner.robot_mut().begin(self.now, z).path_mm.get();
@@ -203,21 +196,14 @@ impl<K: Recorder> SimCell<K> {
                     self.speed = Some(state.speed_mm_per_s);
                     self.tell(&Event::Robot(state), witness);
                     let ended = !matches!(state.mode, RobotMode::Print | RobotMode::Hold);
-                    if ended || (at - began).secs() > LONGEST_LAYER_S {
+                    let too_long = (at - began).secs() > LONGEST_LAYER_S;
+                    if ended || too_long || witness.has_seen_enough() {
                         let whole = state.mode == RobotMode::Idle;
                         return LayerEnd { took: at - began, whole };
                     }
                 }
                 What::Frame => self.look(witness),
-                What::ExtruderReport => {
-                    if let Some((flow, report)) = self.extruder_reports() {
-                        let step = self.tell(&Event::Extruder(report), witness).step;
-                        let side = step.extruder.unwrap_or_default();
-                        let laying = side.state == ExtruderState::Running;
-                        let wanted = laying.then_some(side.trace.flow_mm3_per_s);
-                        witness.flow(self.now, wanted, flow);
-                    }
-                }
+                What::ExtruderReport => self.extruder_reports(witness),
                 What::ExtruderTick => {
                     let _ = self.tell(&Event::ExtruderTick, witness);
                 }
@@ -239,11 +225,14 @@ impl<K: Recorder> SimCell<K> {
         handled
     }
 
-    fn extruder_reports(&mut self) -> Option<(Mm3PerS, ExtruderReport)> {
+    fn extruder_reports(&mut self, witness: &mut impl Witness) {
         let now = self.now;
-        let extruder = self.runner.extruder_mut().as_mut()?;
+        let Some(extruder) = self.runner.extruder_mut() else { return };
         extruder.advance(now);
-        Some((extruder.flow(), extruder.report()))
+        let (flow, report) = (extruder.flow(), extruder.report());
+        let side = self.tell(&Event::Extruder(report), witness).step.extruder.unwrap_or_default();
+        let laying = side.state == ExtruderState::Running;
+        witness.flow(now, laying.then_some(side.trace.flow_mm3_per_s), flow);
     }
 
     /// Lays the bead up to where the nozzle is now.
@@ -315,81 +304,4 @@ impl<K: Recorder> SimCell<K> {
             setpoint: self.setpoint,
         });
     }
-}
-
-/// What comes next.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum What {
-    Report,
-    ExtruderReport,
-    Frame,
-    Tick,
-    ExtruderTick,
-}
-
-/// One clock of a cell: period and phase \[s\], how often it has struck, and
-/// what for.
-#[derive(Debug, Clone, Copy)]
-struct Clock {
-    period: f64,
-    phase: f64,
-    count: u32,
-    what: What,
-}
-
-/// The clocks of a cell; at the same moment the first of them comes first.
-struct Ticker {
-    began: Stamp,
-    clocks: Vec<Clock>,
-}
-
-impl Ticker {
-    fn new(cell: &Cell, run: &RunPart, began: Stamp, layer: u64) -> Self {
-        let simulation = &cell.simulation;
-        let (frame, tick) = (1.0 / run.camera.rate_hz, 1.0 / run.robot.rate_hz);
-        let step = simulation.step.secs();
-        // On the grid of the world, as a real cell's clocks are not.
-        let phase = |which: u64, period: f64| {
-            if !simulation.random_phase {
-                return 0.0;
-            }
-            let word = hash::mix(&[simulation.seed, layer, which]);
-            #[expect(clippy::cast_precision_loss, reason = "53 bits fit")]
-            let share = (word >> 11) as f64 / (1_u64 << 53) as f64;
-            (share * period / step).floor() * step
-        };
-        let clock = |period, phase, what| Clock { period, phase, count: 0, what };
-        let mut clocks = vec![
-            clock(step, 0.0, What::Report),
-            clock(frame, phase(1, frame), What::Frame),
-            clock(tick, phase(2, tick), What::Tick),
-        ];
-        if let Some(part) = &run.extruder {
-            let rates = part.extruder.rates;
-            clocks.insert(1, clock(1.0 / rates.io_hz, 0.0, What::ExtruderReport));
-            clocks.push(clock(1.0 / rates.feedforward_hz, 0.0, What::ExtruderTick));
-        }
-        Self { began, clocks }
-    }
-
-    fn next(&mut self) -> (Stamp, What) {
-        let due = |clock: &Clock| {
-            self.began + Span::from_secs(clock.phase + clock.period * f64::from(clock.count))
-        };
-        let first = self.clocks.iter_mut().min_by_key(|clock| due(clock));
-        first.map_or((self.began, What::Report), |clock| {
-            let at = due(clock);
-            clock.count += 1;
-            (at, clock.what)
-        })
-    }
-}
-
-/// A witness that hears nothing.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Deaf;
-
-impl Witness for Deaf {
-    fn step(&mut self, _: Stamp, _: &Event, _: &Step) {}
-    fn look(&mut self, _: &Sight<'_>) {}
 }

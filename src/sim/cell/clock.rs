@@ -1,0 +1,74 @@
+//! The clocks of a simulated cell, and which of them strikes next.
+
+use crate::config::Cell;
+use crate::config::cell::RunPart;
+use crate::sim::hash;
+use crate::time::{Span, Stamp};
+
+/// What comes next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum What {
+    Report,
+    ExtruderReport,
+    Frame,
+    Tick,
+    ExtruderTick,
+}
+
+/// One clock of a cell: period and phase \[s\], how often it has struck, and
+/// what for.
+#[derive(Debug, Clone, Copy)]
+struct Clock {
+    period: f64,
+    phase: f64,
+    count: u32,
+    what: What,
+}
+
+/// The clocks of a cell; at the same moment the first of them comes first.
+pub struct Ticker {
+    began: Stamp,
+    clocks: Vec<Clock>,
+}
+
+impl Ticker {
+    pub fn new(cell: &Cell, run: &RunPart, began: Stamp, layer: u64) -> Self {
+        let simulation = &cell.simulation;
+        let (frame, tick) = (1.0 / run.camera.rate_hz, 1.0 / run.robot.rate_hz);
+        let step = simulation.step.secs();
+        // On the grid of the world, as a real cell's clocks are not.
+        let phase = |which: u64, period: f64| {
+            if !simulation.random_phase {
+                return 0.0;
+            }
+            let word = hash::mix(&[simulation.seed, layer, which]);
+            #[expect(clippy::cast_precision_loss, reason = "53 bits fit")]
+            let share = (word >> 11) as f64 / (1_u64 << 53) as f64;
+            (share * period / step).floor() * step
+        };
+        let clock = |period, phase, what| Clock { period, phase, count: 0, what };
+        let mut clocks = vec![
+            clock(step, 0.0, What::Report),
+            clock(frame, phase(1, frame), What::Frame),
+            clock(tick, phase(2, tick), What::Tick),
+        ];
+        if let Some(part) = &run.extruder {
+            let rates = part.extruder.rates;
+            clocks.insert(1, clock(1.0 / rates.io_hz, 0.0, What::ExtruderReport));
+            clocks.push(clock(1.0 / rates.feedforward_hz, 0.0, What::ExtruderTick));
+        }
+        Self { began, clocks }
+    }
+
+    pub fn next(&mut self) -> (Stamp, What) {
+        let due = |clock: &Clock| {
+            self.began + Span::from_secs(clock.phase + clock.period * f64::from(clock.count))
+        };
+        let first = self.clocks.iter_mut().min_by_key(|clock| due(clock));
+        first.map_or((self.began, What::Report), |clock| {
+            let at = due(clock);
+            clock.count += 1;
+            (at, clock.what)
+        })
+    }
+}
