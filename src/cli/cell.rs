@@ -1,6 +1,9 @@
 //! Loading a cell with all that it refers to.
 
 pub mod extruder;
+mod range;
+
+pub use range::beyond_model;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -100,12 +103,12 @@ impl LoadedCell {
         let part = self.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
         let Some(part) = part else { return Ok(None) };
         let plant = self.plant(part)?;
-        Ok(self.extruder()?.map(|side| Rig {
-            setup: side.setup,
-            demand: part.demand,
-            plant,
-            nominal_flow: part.plant_nominal,
-        }))
+        let Some(side) = self.extruder()? else { return Ok(None) };
+        if let Some(beyond) = beyond_model(part, &side)? {
+            tell!("warning: {beyond}");
+        }
+        let (demand, nominal_flow) = (part.demand, part.plant_nominal);
+        Ok(Some(Rig { setup: side.setup, demand, plant, nominal_flow }))
     }
 
     /// The map of the measured surface, for a camera that rides as the cell

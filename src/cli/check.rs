@@ -7,7 +7,7 @@ use clap::Args;
 use nalgebra::Point3;
 
 use super::WrongArguments;
-use super::cell::LoadedCell;
+use super::cell::{LoadedCell, beyond_model};
 use crate::calib::Calibration;
 use crate::config::Cell;
 use crate::config::cell::{Purpose, RunPart, Source};
@@ -157,7 +157,11 @@ fn about_extruder(loaded: &LoadedCell) -> anyhow::Result<()> {
         "  extruder     told {low} to {high} {unit}, {:.1} mm³/s wanted",
         part.demand.nominal().get()
     );
-    let _ = loaded.extruder()?;
+    if let Some(side) = loaded.extruder()?
+        && let Some(beyond) = beyond_model(part, &side)?
+    {
+        say!("  WARNING      {beyond}");
+    }
     if part.plant.is_some() {
         let _ = loaded.plant(part)?;
     }

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::Args;
 
-use super::cell::LoadedCell;
+use super::cell::{LoadedCell, beyond_model};
 use super::{Voice, WrongArguments, outcome};
 use crate::config::cell::{Purpose, RunPart};
 use crate::io::clock::RunClock;
@@ -146,5 +146,8 @@ fn live_extruder(
         ))
         .into());
     };
+    if let Some(beyond) = beyond_model(part, &side)? {
+        tell!("warning: {beyond}");
+    }
     Ok((Some(LiveExtruder { setup: side.setup, demand: part.demand, link }), side.file))
 }
