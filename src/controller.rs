@@ -9,28 +9,24 @@
 //!   goes, and a fault when it stays too long.
 //! - fault: the robot is told to stop; left when the robot is idle again.
 
+mod extrude;
+mod robot;
+mod track;
+
+use extrude::ExtruderSide;
+
 use crate::config::cell::RunPart;
 use crate::config::control::Control;
 use crate::control::follow::{Follow, Verdict};
 use crate::control::limiter::Limits;
-use crate::control::pi::{Pi, Saturation};
+use crate::control::pi::Pi;
 use crate::control::transport::Transport;
 use crate::control::{
-    Command, Event, ExtruderStep, Fault, Hold, Limit, RobotLimits, RobotMode, RobotState, State,
-    Step, Trace,
+    Command, Event, Fault, Hold, Limit, RobotMode, RobotState, State, Step, Trace,
 };
-use crate::extruder::{
-    ExtruderFault, ExtruderSetup, ExtruderState, FlowDemand, Laying, Supervisor,
-};
-use crate::time::{Span, Stamp};
+use crate::extruder::{ExtruderSetup, FlowDemand, Supervisor};
+use crate::time::Stamp;
 use crate::units::{Mm, MmPerS};
-
-/// Share of the setpoint at which a robot that starts has run up.
-const RUN_UP: f64 = 0.95;
-
-/// Least share of its speed from which the speed of a robot that goes by the
-/// flow is taken for the law's: below, the robot's limits say more of it.
-const LEAST_SHARE: f64 = 0.5;
 
 /// Everything the controller has to know of its cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,13 +63,6 @@ enum Phase {
     Tracking { pi: Pi, seen_at: Stamp, demand: MmPerS },
     Holding { since: Stamp, why: Hold },
     Fault { why: Fault },
-}
-
-/// The extruder side of a controller, where a cell has one.
-#[derive(Debug, Clone, PartialEq)]
-struct ExtruderSide {
-    supervisor: Supervisor,
-    demand: FlowDemand,
 }
 
 /// The controller of a cell: the width by the robot's speed and, where the
@@ -139,61 +128,6 @@ impl Controller {
         step
     }
 
-    /// The extruder side's answer to what concerns it.
-    fn extrude(&mut self, now: Stamp, event: &Event) -> Option<ExtruderStep> {
-        let laying = self.laying();
-        let ExtruderSide { supervisor, .. } = self.extruder.as_mut()?;
-        let command = match event {
-            Event::Extruder(report) => {
-                supervisor.reported(now, report);
-                None
-            }
-            Event::ExtruderUp => {
-                supervisor.link_came_up();
-                None
-            }
-            Event::ExtruderDown { .. } => {
-                supervisor.link_went_down(now);
-                None
-            }
-            Event::ExtruderTick => supervisor.tick(now, laying),
-            Event::Stop => supervisor.stop(),
-            _ => return None,
-        };
-        Some(ExtruderStep { command, state: supervisor.state(), trace: supervisor.trace() })
-    }
-
-    /// What the extruder side has to know of the robot's.
-    fn laying(&self) -> Laying {
-        let Some(ExtruderSide { demand, .. }) = &self.extruder else { return Laying::Idle };
-        match &self.phase {
-            Phase::Idle => Laying::Idle,
-            Phase::Fault { .. } => Laying::Stopped,
-            _ if self.ended => Laying::Stopped,
-            Phase::Priming | Phase::Tracking { .. } | Phase::Holding { .. } => {
-                let told = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
-                // No extruder keeps up with a robot that starts; it is ready for
-                // the speed that comes.
-                let robot = self.robot.filter(|_| self.run_up);
-                let robot = robot.map(|robot| (told, robot.speed_mm_per_s));
-                Laying::Bead(demand.wanted(robot))
-            }
-        }
-    }
-
-    /// Share of the width controller's speed that the flow at the nozzle
-    /// allows; 1 where the robot does not go by it.
-    fn flow_share(&self) -> f64 {
-        self.extruder.as_ref().map_or(1.0, |side| side.supervisor.robot_share())
-    }
-
-    fn extruder_fault(&self) -> Option<ExtruderFault> {
-        match self.extruder.as_ref()?.supervisor.state() {
-            ExtruderState::Fault(why) => Some(why),
-            _ => None,
-        }
-    }
-
     /// The robot side's answer.
     fn steer(&mut self, now: Stamp, event: &Event) -> Step {
         let mut trace = Trace::default();
@@ -257,75 +191,6 @@ impl Controller {
         }
     }
 
-    fn measured(&mut self, captured_at: Stamp, width: Mm, trace: &mut Trace) {
-        let error = width - self.setup.control.target;
-        trace.error_mm = Some(error);
-        self.place(captured_at, trace);
-        let primed = trace
-            .nozzle_path_mm
-            .is_some_and(|path| path - self.bead_start >= self.setup.start_length);
-        let own_bead = trace.bead_expected;
-        match &self.phase {
-            Phase::Tracking { .. } => self.track(captured_at, error, trace),
-            Phase::Priming | Phase::Holding { why: Hold::NoWidth, .. }
-                if primed && own_bead && !self.ended =>
-            {
-                self.start_tracking(captured_at, error, trace);
-            }
-            _ => {}
-        }
-    }
-
-    /// Where the nozzle was when a frame was captured, and where the bead in
-    /// it had been laid.
-    fn place(&self, captured_at: Stamp, trace: &mut Trace) {
-        trace.captured_at = Some(captured_at);
-        trace.nozzle_path_mm = self.transport.path_at(captured_at);
-        trace.bead_path_mm = trace.nozzle_path_mm.map(|path| path - self.setup.camera_offset);
-        trace.bead_expected = self.phase != Phase::Idle
-            && trace.bead_path_mm.is_some_and(|path| path >= self.bead_start);
-    }
-
-    fn start_tracking(&mut self, captured_at: Stamp, error: Mm, trace: &mut Trace) {
-        let driven = self.robot.map_or(self.setup.start_speed, |robot| robot.speed_mm_per_s);
-        // A robot that goes by the flow is slower or faster than the law says.
-        let share = self.flow_share().max(LEAST_SHARE);
-        let own = driven * (1.0 / share);
-        let mut pi = Pi::start_bumpless(self.setup.control.gains, own, error);
-        let demand = pi.step(error, Span::ZERO, Saturation::None);
-        trace.note(&demand);
-        self.told = self.told.map(|(at, _)| (at, driven));
-        self.phase = Phase::Tracking { pi, seen_at: captured_at, demand: demand.speed };
-    }
-
-    fn track(&mut self, captured_at: Stamp, error: Mm, trace: &mut Trace) {
-        let saturation = self.saturation();
-        let max_gap = self.setup.control.max_gap;
-        let Phase::Tracking { pi, seen_at, demand } = &mut self.phase else { return };
-        let dt = captured_at - *seen_at;
-        if dt <= Span::ZERO {
-            return;
-        }
-        if dt > max_gap {
-            self.start_tracking(captured_at, error, trace);
-            return;
-        }
-        let wanted = pi.step(error, dt, saturation);
-        trace.note(&wanted);
-        *seen_at = captured_at;
-        *demand = wanted.speed;
-    }
-
-    /// In which direction the robot cannot follow, from the limits that acted
-    /// on the last setpoint and from the speed that is read back.
-    fn saturation(&self) -> Saturation {
-        match (self.limit, self.verdict) {
-            (Limit::MaxSpeed | Limit::Acceleration, _) | (_, Verdict::Slower) => Saturation::Above,
-            (Limit::MinSpeed | Limit::Deceleration, _) | (_, Verdict::Faster) => Saturation::Below,
-            _ => Saturation::None,
-        }
-    }
-
     fn tick(&mut self, now: Stamp, trace: &mut Trace) -> Option<Command> {
         self.lose_patience(now);
         let mode = self.robot?.mode;
@@ -370,91 +235,6 @@ impl Controller {
         }
     }
 
-    fn reported(&mut self, now: Stamp, state: &RobotState) {
-        self.transport.observe(now, state);
-        let before = self.robot.replace(*state);
-        if self.ended {
-            return;
-        }
-        match state.mode {
-            RobotMode::Idle => self.become_idle(),
-            RobotMode::Print => self.printing(now, state, before),
-            RobotMode::Hold => {
-                self.follow.reset();
-                self.hold_if_printing(now, Hold::RobotHolds);
-            }
-            RobotMode::Stop => self.robot_stopped(Fault::RobotStopped),
-            RobotMode::Fault => self.robot_stopped(Fault::Robot),
-        }
-    }
-
-    fn become_idle(&mut self) {
-        self.phase = Phase::Idle;
-        self.run_up = false;
-        self.told = None;
-        self.limit = Limit::None;
-        self.follow.reset();
-        self.verdict = Verdict::Follows;
-    }
-
-    fn robot_stopped(&mut self, why: Fault) {
-        self.follow.reset();
-        if !matches!(self.phase, Phase::Fault { .. } | Phase::Idle) {
-            self.phase = Phase::Fault { why };
-        }
-    }
-
-    fn printing(&mut self, now: Stamp, state: &RobotState, before: Option<RobotState>) {
-        let fresh = before.is_some_and(|last| state.path_mm < last.path_mm);
-        if fresh {
-            self.become_idle();
-        }
-        if self.phase == Phase::Idle {
-            self.bead_start = state.path_mm;
-            self.phase = Phase::Priming;
-        }
-        let told = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
-        self.run_up |= state.speed_mm_per_s >= told * RUN_UP;
-        if let Some((_, told)) = self.told {
-            self.verdict = self.follow.observe(now, told, state.speed_mm_per_s);
-        }
-        match (self.verdict, &self.phase) {
-            (Verdict::Lost, Phase::Holding { .. } | Phase::Tracking { .. } | Phase::Priming) => {
-                self.phase = Phase::Fault { why: Fault::SpeedMismatch };
-            }
-            (Verdict::Mismatch, _) => self.hold_if_printing(now, Hold::SpeedMismatch),
-            (
-                _,
-                Phase::Holding {
-                    why: Hold::RobotHolds | Hold::LinkDown | Hold::SpeedMismatch, ..
-                },
-            ) => {
-                self.resume(now, state);
-            }
-            _ => {}
-        }
-    }
-
-    /// The reason for a hold has gone: prime on, or wait for a width.
-    fn resume(&mut self, now: Stamp, state: &RobotState) {
-        self.phase = if state.path_mm - self.bead_start < self.setup.start_length {
-            Phase::Priming
-        } else {
-            Phase::Holding { since: now, why: Hold::NoWidth }
-        };
-    }
-
-    fn link_came_up(&mut self, now: Stamp, robot: &RobotLimits) {
-        self.link_up = true;
-        self.robot = None;
-        let limits = self.setup.limits;
-        if limits.min_speed < robot.min_mm_per_s || limits.max_speed > robot.max_mm_per_s {
-            self.link_up = false;
-            self.phase = Phase::Holding { since: now, why: Hold::RobotLimits };
-            self.ended = true;
-        }
-    }
-
     /// Holds a bead that is being laid; a first reason stays.
     fn hold_if_printing(&mut self, now: Stamp, why: Hold) {
         if matches!(self.phase, Phase::Priming | Phase::Tracking { .. }) {
@@ -469,14 +249,6 @@ impl Controller {
     fn end(&mut self, now: Stamp, why: Hold) {
         self.ended = true;
         self.phase = Phase::Holding { since: now, why };
-    }
-}
-
-impl Trace {
-    fn note(&mut self, demand: &crate::control::pi::Demand) {
-        self.proportional_mm_per_s = Some(demand.proportional);
-        self.integral_mm_per_s = Some(demand.integral);
-        self.demand_mm_per_s = Some(demand.speed);
     }
 }
 

@@ -1,7 +1,11 @@
 //! What an operator relies on, event by event.
 
+mod extruder;
+
 use super::*;
+use crate::control::RobotLimits;
 use crate::control::pi::PiGains;
+use crate::time::Span;
 use crate::units::MmPerS2;
 
 /// The cell of the 2022 paper.

@@ -1,0 +1,71 @@
+//! The extruder side of a controller: what it hears of the robot's, and what
+//! it answers.
+
+use super::{Controller, Phase};
+use crate::control::{Event, ExtruderStep};
+use crate::extruder::{ExtruderFault, ExtruderState, FlowDemand, Laying, Supervisor};
+use crate::time::Stamp;
+
+/// The extruder side of a controller, where a cell has one.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ExtruderSide {
+    pub(super) supervisor: Supervisor,
+    pub(super) demand: FlowDemand,
+}
+
+impl Controller {
+    /// The extruder side's answer to what concerns it.
+    pub(super) fn extrude(&mut self, now: Stamp, event: &Event) -> Option<ExtruderStep> {
+        let laying = self.laying();
+        let ExtruderSide { supervisor, .. } = self.extruder.as_mut()?;
+        let command = match event {
+            Event::Extruder(report) => {
+                supervisor.reported(now, report);
+                None
+            }
+            Event::ExtruderUp => {
+                supervisor.link_came_up();
+                None
+            }
+            Event::ExtruderDown { .. } => {
+                supervisor.link_went_down(now);
+                None
+            }
+            Event::ExtruderTick => supervisor.tick(now, laying),
+            Event::Stop => supervisor.stop(),
+            _ => return None,
+        };
+        Some(ExtruderStep { command, state: supervisor.state(), trace: supervisor.trace() })
+    }
+
+    /// What the extruder side has to know of the robot's.
+    fn laying(&self) -> Laying {
+        let Some(ExtruderSide { demand, .. }) = &self.extruder else { return Laying::Idle };
+        match &self.phase {
+            Phase::Idle => Laying::Idle,
+            Phase::Fault { .. } => Laying::Stopped,
+            _ if self.ended => Laying::Stopped,
+            Phase::Priming | Phase::Tracking { .. } | Phase::Holding { .. } => {
+                let told = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
+                // No extruder keeps up with a robot that starts; it is ready for
+                // the speed that comes.
+                let robot = self.robot.filter(|_| self.run_up);
+                let robot = robot.map(|robot| (told, robot.speed_mm_per_s));
+                Laying::Bead(demand.wanted(robot))
+            }
+        }
+    }
+
+    /// Share of the width controller's speed that the flow at the nozzle
+    /// allows; 1 where the robot does not go by it.
+    pub(super) fn flow_share(&self) -> f64 {
+        self.extruder.as_ref().map_or(1.0, |side| side.supervisor.robot_share())
+    }
+
+    pub(super) fn extruder_fault(&self) -> Option<ExtruderFault> {
+        match self.extruder.as_ref()?.supervisor.state() {
+            ExtruderState::Fault(why) => Some(why),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! What the robot reports: its mode, its path and how it follows its speed.
+
+use super::{Controller, Phase};
+use crate::control::follow::Verdict;
+use crate::control::{Fault, Hold, Limit, RobotLimits, RobotMode, RobotState};
+use crate::time::Stamp;
+
+/// Share of the setpoint at which a robot that starts has run up.
+const RUN_UP: f64 = 0.95;
+
+impl Controller {
+    pub(super) fn reported(&mut self, now: Stamp, state: &RobotState) {
+        self.transport.observe(now, state);
+        let before = self.robot.replace(*state);
+        if self.ended {
+            return;
+        }
+        match state.mode {
+            RobotMode::Idle => self.become_idle(),
+            RobotMode::Print => self.printing(now, state, before),
+            RobotMode::Hold => {
+                self.follow.reset();
+                self.hold_if_printing(now, Hold::RobotHolds);
+            }
+            RobotMode::Stop => self.robot_stopped(Fault::RobotStopped),
+            RobotMode::Fault => self.robot_stopped(Fault::Robot),
+        }
+    }
+
+    fn become_idle(&mut self) {
+        self.phase = Phase::Idle;
+        self.run_up = false;
+        self.told = None;
+        self.limit = Limit::None;
+        self.follow.reset();
+        self.verdict = Verdict::Follows;
+    }
+
+    fn robot_stopped(&mut self, why: Fault) {
+        self.follow.reset();
+        if !matches!(self.phase, Phase::Fault { .. } | Phase::Idle) {
+            self.phase = Phase::Fault { why };
+        }
+    }
+
+    fn printing(&mut self, now: Stamp, state: &RobotState, before: Option<RobotState>) {
+        let fresh = before.is_some_and(|last| state.path_mm < last.path_mm);
+        if fresh {
+            self.become_idle();
+        }
+        if self.phase == Phase::Idle {
+            self.bead_start = state.path_mm;
+            self.phase = Phase::Priming;
+        }
+        let told = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
+        self.run_up |= state.speed_mm_per_s >= told * RUN_UP;
+        if let Some((_, told)) = self.told {
+            self.verdict = self.follow.observe(now, told, state.speed_mm_per_s);
+        }
+        match (self.verdict, &self.phase) {
+            (Verdict::Lost, Phase::Holding { .. } | Phase::Tracking { .. } | Phase::Priming) => {
+                self.phase = Phase::Fault { why: Fault::SpeedMismatch };
+            }
+            (Verdict::Mismatch, _) => self.hold_if_printing(now, Hold::SpeedMismatch),
+            (
+                _,
+                Phase::Holding {
+                    why: Hold::RobotHolds | Hold::LinkDown | Hold::SpeedMismatch, ..
+                },
+            ) => {
+                self.resume(now, state);
+            }
+            _ => {}
+        }
+    }
+
+    /// The reason for a hold has gone: prime on, or wait for a width.
+    fn resume(&mut self, now: Stamp, state: &RobotState) {
+        self.phase = if state.path_mm - self.bead_start < self.setup.start_length {
+            Phase::Priming
+        } else {
+            Phase::Holding { since: now, why: Hold::NoWidth }
+        };
+    }
+
+    pub(super) fn link_came_up(&mut self, now: Stamp, robot: &RobotLimits) {
+        self.link_up = true;
+        self.robot = None;
+        let limits = self.setup.limits;
+        if limits.min_speed < robot.min_mm_per_s || limits.max_speed > robot.max_mm_per_s {
+            self.link_up = false;
+            self.phase = Phase::Holding { since: now, why: Hold::RobotLimits };
+            self.ended = true;
+        }
+    }
+}

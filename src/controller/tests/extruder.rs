@@ -1,0 +1,173 @@
+//! The extruder side through the controller: a link that goes and comes, and
+//! bead after bead.
+
+use super::*;
+use crate::extruder::law::{Constant, Played};
+use crate::extruder::{
+    CommandLimits, Drive, ExtruderCommand, ExtruderFault, ExtruderHold, ExtruderReport,
+    ExtruderState, Follows, Law, PumpMode,
+};
+use crate::identify::profile::{Point, Profile};
+use crate::units::{Mm2, Rpm};
+
+const TICK_S: f64 = 0.005;
+const SPEED: f64 = 112.5;
+
+fn rig(law: Law) -> (ExtruderSetup, FlowDemand) {
+    let setup = ExtruderSetup {
+        drive: Drive::Rpm,
+        law,
+        limits: CommandLimits::new(0.0, 60.0, 400.0).unwrap(),
+        feedforward_period: Span::from_secs(TICK_S),
+        control_period: Span::from_millis(50),
+        io_period: Span::from_millis(20),
+        max_gap: Span::from_millis(200),
+        max_hold: Span::from_secs(1.0),
+        max_pressure: None,
+    };
+    let demand = FlowDemand::new(Mm2::constant(10.0), MmPerS::constant(SPEED), Follows::Robot);
+    (setup, demand)
+}
+
+/// A robot that prints or stands, and an extruder that does what it is told.
+struct Cell {
+    line: Line,
+    mode: RobotMode,
+    path: f64,
+    ticks: u32,
+    link: bool,
+    told: Option<ExtruderCommand>,
+    sent: Vec<(f64, ExtruderCommand)>,
+}
+
+impl Cell {
+    fn new(law: Law) -> Self {
+        let mut line = Line::new();
+        let (setup, demand) = rig(law);
+        line.controller = line.controller.with_extruder(setup, demand);
+        let mut cell = Self {
+            line,
+            mode: RobotMode::Idle,
+            path: 0.0,
+            ticks: 0,
+            link: false,
+            told: None,
+            sent: Vec::new(),
+        };
+        cell.link(true);
+        cell
+    }
+
+    fn link(&mut self, up: bool) {
+        self.link = up;
+        let down = Event::ExtruderDown { reason: "no STATE for 500 ms".into() };
+        let event = if up { Event::ExtruderUp } else { down };
+        assert!(self.line.give(&event).extruder.unwrap().command.is_none());
+    }
+
+    /// Lets time pass; gives the state of the extruder side.
+    fn go(&mut self, secs: f64) -> ExtruderState {
+        let until = self.line.now + secs - 1e-9;
+        let mut state = ExtruderState::Off;
+        while self.line.now < until {
+            if self.ticks.is_multiple_of(4) {
+                let speed = if self.mode == RobotMode::Print { SPEED } else { 0.0 };
+                let _ = self.line.robot(self.mode, self.path, speed);
+                if self.link {
+                    let report = self.report();
+                    let _ = self.line.give(&Event::Extruder(report));
+                }
+            }
+            let side = self.line.give(&Event::ExtruderTick).extruder.unwrap();
+            state = side.state;
+            if let Some(command) = side.command {
+                assert!(self.link, "a command without a link");
+                self.told = Some(command);
+                self.sent.push((self.line.now, command));
+            }
+            self.ticks += 1;
+            self.line.now += TICK_S;
+            if self.mode == RobotMode::Print {
+                self.path += SPEED * TICK_S;
+            }
+        }
+        state
+    }
+
+    fn report(&self) -> ExtruderReport {
+        let on = self.told.filter(|told| told.pump_on);
+        ExtruderReport {
+            pump: if on.is_some() { PumpMode::On } else { PumpMode::Off },
+            valve_open: self.told.is_some_and(|told| told.valve_open),
+            screw_rpm: Rpm::new(on.map_or(0.0, |told| told.value)).ok(),
+            pressure_mpa: None,
+            flow_mm3_per_s: None,
+            filled_mm: None,
+        }
+    }
+
+    fn last(&self) -> ExtruderCommand {
+        self.told.unwrap()
+    }
+}
+
+#[test]
+fn a_lost_extruder_is_held_while_the_robot_goes_on() {
+    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    cell.mode = RobotMode::Print;
+    assert_eq!(cell.go(1.0), ExtruderState::Running);
+    cell.link(false);
+    assert_eq!(cell.go(0.8), ExtruderState::Holding(ExtruderHold::LinkDown));
+    assert_eq!(cell.line.tick(), Some(SPEED));
+    cell.link(true);
+    assert_eq!(cell.go(0.2), ExtruderState::Running);
+    assert_eq!(cell.last(), ExtruderCommand { pump_on: true, valve_open: true, value: 30.0 });
+}
+
+#[test]
+fn an_extruder_that_stays_away_stops_the_robot_and_is_stopped_when_it_comes_back() {
+    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    cell.mode = RobotMode::Print;
+    let _ = cell.go(1.0);
+    cell.link(false);
+    let fault = ExtruderFault::HeldTooLong(ExtruderHold::LinkDown);
+    assert_eq!(cell.go(1.1), ExtruderState::Fault(fault));
+    assert_eq!(cell.line.controller.state(), State::Fault(Fault::Extruder(fault)));
+    assert_eq!(cell.line.give(&Event::Tick).command, Some(Command::Stop));
+    cell.link(true);
+    assert_eq!(cell.go(0.1), ExtruderState::Fault(fault));
+    assert!(!cell.last().pump_on && !cell.last().valve_open);
+    // The robot's idleness ends the fault on both sides.
+    cell.mode = RobotMode::Idle;
+    assert_eq!(cell.go(0.1), ExtruderState::Off);
+    (cell.mode, cell.path) = (RobotMode::Print, 0.0);
+    assert_eq!(cell.go(0.5), ExtruderState::Running);
+}
+
+#[test]
+fn every_bead_begins_anew() {
+    let at = |from_s, value| Point { from_s, value };
+    let profile = Profile::new(vec![at(0.0, 20.0), at(0.5, 50.0)], 2.0).unwrap();
+    let mut cell = Cell::new(Law::Profile(Played::new(profile)));
+    for _ in 0..3 {
+        (cell.mode, cell.path) = (RobotMode::Print, 0.0);
+        let sent = cell.sent.len();
+        assert_eq!(cell.go(1.0), ExtruderState::Running);
+        assert_eq!(cell.sent[sent].1.value, 20.0);
+        assert_eq!(cell.last().value, 50.0);
+        cell.mode = RobotMode::Idle;
+        assert_eq!(cell.go(0.5), ExtruderState::Off);
+        assert_eq!(cell.last(), ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 });
+    }
+}
+
+#[test]
+fn a_bead_right_behind_another_keeps_the_pump_running() {
+    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    cell.mode = RobotMode::Print;
+    let _ = cell.go(1.0);
+    let sent = cell.sent.len();
+    cell.path = 0.0;
+    assert_eq!(cell.go(1.0), ExtruderState::Running);
+    assert!(cell.sent[sent..].iter().all(|(_, command)| command.pump_on));
+}

@@ -1,0 +1,91 @@
+//! Widths: where the bead in a frame was laid, and what the PI law makes of it.
+
+use super::{Controller, Phase};
+use crate::control::follow::Verdict;
+use crate::control::pi::{Demand, Pi, Saturation};
+use crate::control::{Hold, Limit, Trace};
+use crate::time::{Span, Stamp};
+use crate::units::Mm;
+
+/// Least share of its speed from which the speed of a robot that goes by the
+/// flow is taken for the law's: below, the robot's limits say more of it.
+const LEAST_SHARE: f64 = 0.5;
+
+impl Controller {
+    pub(super) fn measured(&mut self, captured_at: Stamp, width: Mm, trace: &mut Trace) {
+        let error = width - self.setup.control.target;
+        trace.error_mm = Some(error);
+        self.place(captured_at, trace);
+        let primed = trace
+            .nozzle_path_mm
+            .is_some_and(|path| path - self.bead_start >= self.setup.start_length);
+        let own_bead = trace.bead_expected;
+        match &self.phase {
+            Phase::Tracking { .. } => self.track(captured_at, error, trace),
+            Phase::Priming | Phase::Holding { why: Hold::NoWidth, .. }
+                if primed && own_bead && !self.ended =>
+            {
+                self.start_tracking(captured_at, error, trace);
+            }
+            _ => {}
+        }
+    }
+
+    /// Where the nozzle was when a frame was captured, and where the bead in
+    /// it had been laid.
+    pub(super) fn place(&self, captured_at: Stamp, trace: &mut Trace) {
+        trace.captured_at = Some(captured_at);
+        trace.nozzle_path_mm = self.transport.path_at(captured_at);
+        trace.bead_path_mm = trace.nozzle_path_mm.map(|path| path - self.setup.camera_offset);
+        trace.bead_expected = self.phase != Phase::Idle
+            && trace.bead_path_mm.is_some_and(|path| path >= self.bead_start);
+    }
+
+    fn start_tracking(&mut self, captured_at: Stamp, error: Mm, trace: &mut Trace) {
+        let driven = self.robot.map_or(self.setup.start_speed, |robot| robot.speed_mm_per_s);
+        // A robot that goes by the flow is slower or faster than the law says.
+        let share = self.flow_share().max(LEAST_SHARE);
+        let own = driven * (1.0 / share);
+        let mut pi = Pi::start_bumpless(self.setup.control.gains, own, error);
+        let demand = pi.step(error, Span::ZERO, Saturation::None);
+        trace.note(&demand);
+        self.told = self.told.map(|(at, _)| (at, driven));
+        self.phase = Phase::Tracking { pi, seen_at: captured_at, demand: demand.speed };
+    }
+
+    fn track(&mut self, captured_at: Stamp, error: Mm, trace: &mut Trace) {
+        let saturation = self.saturation();
+        let max_gap = self.setup.control.max_gap;
+        let Phase::Tracking { pi, seen_at, demand } = &mut self.phase else { return };
+        let dt = captured_at - *seen_at;
+        if dt <= Span::ZERO {
+            return;
+        }
+        if dt > max_gap {
+            self.start_tracking(captured_at, error, trace);
+            return;
+        }
+        let wanted = pi.step(error, dt, saturation);
+        trace.note(&wanted);
+        *seen_at = captured_at;
+        *demand = wanted.speed;
+    }
+
+    /// In which direction the robot cannot follow, from the limits that acted
+    /// on the last setpoint and from the speed that is read back.
+    fn saturation(&self) -> Saturation {
+        match (self.limit, self.verdict) {
+            (Limit::MaxSpeed | Limit::Acceleration, _) | (_, Verdict::Slower) => Saturation::Above,
+            (Limit::MinSpeed | Limit::Deceleration, _) | (_, Verdict::Faster) => Saturation::Below,
+            _ => Saturation::None,
+        }
+    }
+}
+
+impl Trace {
+    fn note(&mut self, demand: &Demand) {
+        self.proportional_mm_per_s = Some(demand.proportional);
+        self.integral_mm_per_s = Some(demand.integral);
+        self.demand_mm_per_s = Some(demand.speed);
+    }
+}
