@@ -7,6 +7,7 @@ pub mod charts;
 pub mod extruder;
 pub mod headline;
 pub mod histogram;
+pub mod legend;
 pub mod palette;
 pub mod plot;
 pub mod sections;

@@ -4,9 +4,9 @@
 use maud::{Markup, html};
 
 use super::area::{Area, XAxis};
+use super::legend;
 use super::palette::{self, Ink};
 use super::plot::{Layer, Plot, y_range};
-use super::sections::legend;
 use super::series::Series;
 use super::strip::{Mark, Strip};
 use super::strips::{self, Row};
@@ -16,6 +16,9 @@ use crate::offline::names;
 use crate::offline::summary::ExtruderSummary;
 use crate::time::Stamp;
 use crate::units::Mm3PerS;
+
+/// The states of the extruder side.
+const STATES: [&str; 5] = ["off", "starting", "running", "holding", "fault"];
 
 /// What the plots of the extruder side are drawn from.
 #[derive(Debug, Default)]
@@ -87,11 +90,7 @@ impl ExtruderCharts {
                     Row { name: "state", strip: &self.states, ink: palette::state },
                     Row { name: "limit", strip: &self.limits, ink: limit },
                 ]))
-                (legend(&[
-                    ("off", palette::IDLE, "block"), ("starting", palette::PRIMING, "block"),
-                    ("running", palette::TRACKING, "block"), ("holding", palette::HOLDING, "block"),
-                    ("fault", palette::FAULT, "block"), ("a limit acts", palette::LIMIT, "block"),
-                ]))
+                (legend::of_strips(&STATES, &self.states, &self.limits))
                 (self.command_plot(&axis, &told, drive == Drive::Rpm))
                 (sensor(&axis, &self.pressure, "pressure [MPa]", palette::PRESSURE))
                 @if drive != Drive::Rpm {
@@ -120,14 +119,11 @@ impl ExtruderCharts {
                 Layer::Curve(flow, palette::FLOW),
             ],
         };
-        let mut entries = vec![("wanted", palette::TARGET, "dash")];
-        if !flow.is_empty() {
-            entries.push((name, palette::FLOW, ""));
-        }
-        html! {
-            (legend(&entries))
-            (plot.draw())
-        }
+        let entries = [
+            (&self.wanted, ("wanted", palette::TARGET, "dash")),
+            (flow, (name, palette::FLOW, "")),
+        ];
+        html! { (legend::legend(&legend::drawn(&entries))) (plot.draw()) }
     }
 
     fn command_plot(&self, axis: &XAxis, title: &str, with_screw: bool) -> Markup {
@@ -136,12 +132,14 @@ impl ExtruderCharts {
             Layer::Stairs(&self.command, palette::SETPOINT),
         ];
         let mut shown = vec![&self.command];
-        let mut entries =
-            vec![("command", palette::SETPOINT, ""), ("known beforehand", palette::DEMAND, "dash")];
+        let mut entries = vec![
+            (&self.command, ("command", palette::SETPOINT, "")),
+            (&self.feedforward, ("known beforehand", palette::DEMAND, "dash")),
+        ];
         if with_screw {
             layers.push(Layer::Curve(&self.screw, palette::SCREW));
             shown.push(&self.screw);
-            entries.push(("screw", palette::SCREW, ""));
+            entries.push((&self.screw, ("screw", palette::SCREW, "")));
         }
         let plot = Plot {
             area: Area::wide(220.0),
@@ -150,7 +148,7 @@ impl ExtruderCharts {
             y_range: y_range(&shown, &[0.0]),
             layers,
         };
-        html! { (legend(&entries)) (plot.draw()) }
+        html! { (legend::legend(&legend::drawn(&entries))) (plot.draw()) }
     }
 }
 

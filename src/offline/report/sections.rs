@@ -6,6 +6,7 @@ use maud::{Markup, html};
 use super::Report;
 use super::area::{Area, XAxis};
 use super::charts::Twice;
+use super::legend;
 use super::palette::{self, Ink};
 use super::plot::{Layer, Plot, y_range};
 use super::series::Series;
@@ -15,6 +16,11 @@ use super::{advice, histogram};
 use crate::offline::setup;
 use crate::offline::stats::as_f64;
 use crate::offline::summary::Summary;
+
+pub use super::legend::legend;
+
+/// The states of the width controller.
+const STATES: [&str; 5] = ["idle", "priming", "tracking", "holding", "fault"];
 
 /// Width, speed, states and limits over time, or over frames.
 pub fn over_time(report: &Report<'_>) -> Markup {
@@ -35,11 +41,7 @@ pub fn over_time(report: &Report<'_>) -> Markup {
                     Row { name: "state", strip: &charts.states, ink: palette::state },
                     Row { name: "limit", strip: &charts.limits, ink: limit },
                 ]))
-                (legend(&[
-                    ("idle", palette::IDLE, "block"), ("priming", palette::PRIMING, "block"),
-                    ("tracking", palette::TRACKING, "block"), ("holding", palette::HOLDING, "block"),
-                    ("fault", palette::FAULT, "block"), ("a limit acts", palette::LIMIT, "block"),
-                ]))
+                (legend::of_strips(&STATES, &charts.states, &charts.limits))
             }
         }
     }
@@ -80,14 +82,16 @@ fn width_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) ->
         y_range: y_range(&[width], &values),
         layers,
     };
-    let mut entries =
-        vec![("width", palette::WIDTH, ""), ("± 2 standard deviations", palette::WIDTH, "area")];
+    let mut entries = Vec::new();
+    if !width.is_empty() {
+        entries.push(("width", palette::WIDTH, ""));
+        entries.push(("± 2 standard deviations", palette::WIDTH, "area"));
+    }
     if target.is_some() {
         entries.push(("target", palette::TARGET, "dash"));
     }
-    entries.push(("refused frames, in the strip", palette::REJECTED, "block"));
-    if axis.title.starts_with("distance") {
-        entries.pop();
+    if legend::has_marks(&charts.refused) && !axis.title.starts_with("distance") {
+        entries.push(("refused frames, in the strip", palette::REJECTED, "block"));
     }
     html! { (legend(&entries)) (plot.draw()) }
 }
@@ -115,14 +119,15 @@ fn speed_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) ->
         y_range: y_range(&[speed, setpoint], bounds.as_ref().map_or(&[], |bounds| bounds)),
         layers,
     };
-    html! {
-        (legend(&[
-            ("robot", palette::SPEED, ""), ("setpoint", palette::SETPOINT, ""),
-            ("demand of the controller", palette::DEMAND, "dash"),
-            ("limits of the cell", palette::LIMIT, "dash"),
-        ]))
-        (plot.draw())
+    let mut entries = legend::drawn(&[
+        (speed, ("robot", palette::SPEED, "")),
+        (setpoint, ("setpoint", palette::SETPOINT, "")),
+        (demand, ("demand of the controller", palette::DEMAND, "dash")),
+    ]);
+    if bounds.is_some() {
+        entries.push(("limits of the cell", palette::LIMIT, "dash"));
     }
+    html! { (legend(&entries)) (plot.draw()) }
 }
 
 /// Which frames were refused, why, and what to do.
@@ -247,17 +252,6 @@ pub fn latency(report: &Report<'_>) -> Markup {
                 (histogram::draw(latencies))
             }
         }
-    }
-}
-
-/// What the colours of a plot mean: name, colour and kind of line ("", "dash",
-/// "area" or "block").
-pub fn legend(entries: &[(&str, Ink, &str)]) -> Markup {
-    html! {
-        div.legend { @for (name, ink, kind) in entries {
-            @let property = if matches!(*kind, "" | "dash") { "border-color" } else { "background" };
-            span { i class=(kind) style=(format!("{property}:{}", ink.css())) {} (name) }
-        } }
     }
 }
 
