@@ -1,17 +1,35 @@
 //! The extruder side as a user meets it: cell files, simulation, messages.
 
-#![allow(clippy::unwrap_used, reason = "a test may fail")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    reason = "a test may fail"
+)]
 
 use std::fs;
 use std::path::Path;
 use std::process::Output;
 
 use assert_cmd::Command;
+use assert_cmd::cargo::cargo_bin;
+use truebead::cli::cell::LoadedCell;
+use truebead::config::cell::Purpose;
+use truebead::control::{Event, Step};
+use truebead::runner::NoRecorder;
+use truebead::sim::cell::{Sight, SimCell, Witness};
+use truebead::time::Stamp;
+use truebead::units::{Mm, Mm3PerS};
 
 const CELL: &str = include_str!("../cells/extruder.toml");
 
 fn truebead(folder: &Path, args: &[&str]) -> Output {
     Command::cargo_bin("truebead").unwrap().current_dir(folder).args(args).output().unwrap()
+}
+
+/// Folder of the shipped cells.
+fn cells() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/cells"))
 }
 
 /// A cell's text with some parts of it replaced.
@@ -20,6 +38,16 @@ fn changed(cell: &str, changes: &[(&str, &str)]) -> String {
         assert!(text.contains(from), "{from}");
         text.replace(from, to)
     })
+}
+
+/// A number of a summary.
+fn number(of: &serde_json::Value, key: &str) -> f64 {
+    of[key].as_f64().unwrap()
+}
+
+/// Sum of the times that an object of a summary has.
+fn seconds(of: &serde_json::Value) -> f64 {
+    of.as_object().unwrap().values().map(|time| time.as_f64().unwrap()).sum()
 }
 
 /// `[extruder_plant]` of the shipped cell.
@@ -34,7 +62,12 @@ fn simulated_cell(
     changes: &[(&str, &str)],
 ) -> (Option<i32>, String, serde_json::Value) {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("cell.toml"), changed(cell, changes)).unwrap();
+    // Where a cell names a file, it is that beside the shipped ones.
+    let beside = |text: String| {
+        text.replace("\"../models", &format!("\"{}/../models", cells().display()))
+            .replace("\"excite.csv", &format!("\"{}/excite.csv", cells().display()))
+    };
+    fs::write(folder.path().join("cell.toml"), beside(changed(cell, changes))).unwrap();
     let output = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out"]);
     let summary = fs::read_to_string(folder.path().join("out/summary.json"))
         .map_or(serde_json::Value::Null, |text| serde_json::from_str(&text).unwrap());
@@ -174,27 +207,181 @@ fn check_says_what_a_cell_suffices_for_and_what_is_missing() {
     assert!(runs.contains("not for simulate;") && runs.contains("extruder_plant"), "{runs}");
 }
 
-/// Simulates the shipped cell with the model's inverse, some lines changed.
-fn foreseen(changes: &[(&str, &str)]) -> serde_json::Value {
-    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
-    let mut text = include_str!("../cells/extruder-feedforward.toml")
-        .replace("../models", &models.display().to_string());
-    for (from, to) in changes {
-        assert!(text.contains(from), "{from}");
-        text = text.replace(from, to);
-    }
+/// What a user of a shipped cell relies on: it runs from the first to the last
+/// moment of the bead, nothing is missed, limits hardly act, and the robot
+/// brings the width to its target with the flow that comes.
+fn runs_through(cell: &str, changes: &[(&str, &str)], settled_mm: f64) -> serde_json::Value {
+    let (status, said, summary) = simulated_cell(cell, changes);
+    assert_eq!(status, Some(0), "{said}");
+    let side = &summary["extruder"];
+    let times = &side["states_s"];
+    let (running, starting) = (number(times, "running"), number(times, "starting"));
+    let took = number(&summary, "duration_s");
+    assert!((0.02..0.15).contains(&starting) && running + starting > took - 0.1, "{summary}");
+    assert_eq!(seconds(&side["held_for_s"]), 0.0, "{side}");
+    assert!(seconds(&side["limited_by_s"]) < 0.25 * took, "{side}");
+    assert!(side["fault_reasons"].as_object().unwrap().is_empty() && summary["faults"] == 0);
+    assert!(side["commands"].as_f64().unwrap() > 49.0 * running, "{side}");
+    assert!(number(&summary, "width_error_rms_settled_mm") < settled_mm, "{summary}");
+    summary
+}
+
+/// By what share the flow was off on average.
+fn off(summary: &serde_json::Value) -> f64 {
+    let side = &summary["extruder"];
+    number(side, "flow_error_mean_mm3_per_s") / number(side, "flow_mean_mm3_per_s")
+}
+
+#[test]
+fn the_inverse_of_a_model_gives_the_flow_of_a_plant_that_is_nearly_it() {
+    let cell = include_str!("../cells/extruder-feedforward.toml");
+    let summary = runs_through(cell, &[], 0.06);
+    // The plant gives 6 % less than the model says.
+    assert!(off(&summary).abs() < 0.08, "{summary}");
+}
+
+#[test]
+fn a_pressure_that_is_held_gives_the_flow_although_gain_and_load_change() {
+    let cell = include_str!("../cells/extruder-pressure.toml");
+    let held = runs_through(cell, &[], 0.06);
+    assert!(off(&held).abs() < 0.02, "{held}");
+    let law = "strategy = \"pressure\"";
+    let table = &cell[cell.find("[extruder.pressure]").unwrap()..];
+    let table = &table[..table.find("[extruder_plant]").unwrap()];
+    let open = [(law, "strategy = \"constant\"\nconstant_rpm = 27.0"), (table, "")];
+    let (_, _, open) = simulated_cell(cell, &open);
+    assert!(off(&open).abs() > 5.0 * off(&held).abs(), "{open}");
+}
+
+#[test]
+fn a_screw_is_held_at_its_filled_length_and_the_robot_takes_the_flow_that_comes() {
+    let cell = include_str!("../cells/extruder-screw.toml");
+    let summary = runs_through(cell, &[], 1.5);
+    assert!(off(&summary).abs() < 0.10, "{summary}");
+}
+
+#[test]
+fn a_slip_that_grows_is_learnt() {
+    let cell = include_str!("../cells/extruder-adaptive.toml");
+    let learnt = runs_through(cell, &[], 0.7);
+    let dull = [("learning_rate = 0.5", "learning_rate = 0.0")];
+    let (_, _, dull) = simulated_cell(cell, &dull);
+    assert!(off(&learnt).abs() < 0.03, "{learnt}");
+    assert!(off(&dull).abs() > 2.0 * off(&learnt).abs(), "{dull}");
+}
+
+#[test]
+fn a_profile_tells_how_far_it_was_played() {
+    let cell = include_str!("../cells/extruder-excite.toml");
+    let share = |changes: &[(&str, &str)]| {
+        let summary = runs_through(cell, changes, 0.4);
+        let profile = &summary["extruder"]["profile"];
+        (number(profile, "played_share"), number(profile, "outlasted_s"))
+    };
+    let path = cell.lines().find(|line| line.starts_with("path_mm")).unwrap();
+    let (cut_off, none) = share(&[(path, "path_mm = 4000.0")]);
+    assert!((0.5..0.7).contains(&cut_off) && none == 0.0, "{cut_off} {none}");
+    let (whole, more) = share(&[(path, "path_mm = 8000.0")]);
+    assert!(whole == 1.0 && (2.0..12.0).contains(&more), "{whole} {more}");
+}
+
+#[test]
+fn a_model_that_is_used_beyond_its_data_is_warned_of() {
+    let cell = include_str!("../cells/extruder-feedforward.toml");
+    let (_, said, _) = simulated_cell(cell, &[]);
+    assert!(!said.contains("warning"), "{said}");
+    let thinner = [("layer_height_mm = 1.5", "layer_height_mm = 1.0")];
+    let (status, said, _) = simulated_cell(cell, &thinner);
+    assert_eq!(status, Some(0), "{said}");
+    assert!(said.contains("warning") && said.contains("from 25 to 35 rpm"), "{said}");
+}
+
+#[test]
+fn a_simulation_that_is_ended_leaves_what_it_has() {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("cell.toml"), text).unwrap();
-    let output = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out"]);
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    let summary = fs::read_to_string(folder.path().join("out/summary.json")).unwrap();
-    serde_json::from_str(&summary).unwrap()
+    let cell = changed(CELL, &[("path_mm = 2000.0", "path_mm = 9000000.0")]);
+    fs::write(folder.path().join("cell.toml"), cell).unwrap();
+    let mut child = std::process::Command::new(cargo_bin("truebead"))
+        .current_dir(folder.path())
+        .args(["simulate", "cell.toml", "--out", "out", "--record"])
+        .stderr(std::process::Stdio::null())
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let begun = folder.path().join("out/widths.csv.partial");
+    while !begun.exists() {
+        assert_eq!(child.try_wait().unwrap(), None);
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    let interrupt = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
+    assert!(interrupt.success());
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    let mut names: Vec<_> = fs::read_dir(folder.path().join("out"))
+        .unwrap()
+        .map(|file| file.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["recording.mcap", "report.html", "summary.json", "widths.csv"]);
+}
+
+/// The largest error of the flow on each bead, from one to three seconds after
+/// its beginning, as a share of what is wanted.
+#[derive(Default)]
+struct Beads {
+    began: Option<Stamp>,
+    worst: Vec<f64>,
+}
+
+impl Witness for Beads {
+    fn step(&mut self, _: Stamp, _: &Event, _: &Step) {}
+    fn look(&mut self, _: &Sight<'_>) {}
+
+    fn flow(&mut self, now: Stamp, wanted: Option<Mm3PerS>, flow: Mm3PerS) {
+        let Some(wanted) = wanted else {
+            self.began = None;
+            return;
+        };
+        let began = *self.began.get_or_insert_with(|| {
+            self.worst.push(0.0);
+            now
+        });
+        if (1.0..3.0).contains(&(now - began).secs()) {
+            let worst = self.worst.last_mut().unwrap();
+            *worst = worst.max((flow.get() / wanted.get() - 1.0).abs());
+        }
+    }
+}
+
+#[test]
+fn what_was_learnt_on_one_bead_holds_on_the_next() {
+    let loaded = LoadedCell::read(&cells().join("extruder-adaptive.toml"), Purpose::Run).unwrap();
+    let (run, rig) = (loaded.cell.run.clone().unwrap(), loaded.simulated_extruder().unwrap());
+    let calibration = loaded.calibration.clone();
+    let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, NoRecorder, rig).unwrap();
+    let mut beads = Beads::default();
+    for layer in 0..3_u8 {
+        assert!(sim.layer(Mm::constant(20.0 * f64::from(layer)), &mut beads).whole);
+    }
+    let [first, others @ ..] = beads.worst.as_slice() else { panic!("no bead") };
+    assert_eq!(others.len(), 2);
+    assert!(others.iter().all(|worst| 2.0 * worst < *first), "{first} {others:?}");
+}
+
+/// The shipped cell with the model's inverse, some lines changed.
+fn foreseen(changes: &[(&str, &str)]) -> serde_json::Value {
+    let cell = include_str!("../cells/extruder-feedforward.toml");
+    let (status, said, summary) = simulated_cell(cell, changes);
+    assert_eq!(status, Some(0), "{said}");
+    summary
 }
 
 #[test]
 fn a_robot_that_goes_by_the_flow_has_its_width_while_the_extruder_runs_up() {
-    let since_control =
-        |summary: &serde_json::Value| summary["width_error_rms_mm"].as_f64().unwrap();
+    let since_control = |summary: &serde_json::Value| number(summary, "width_error_rms_mm");
     let alone = foreseen(&[("robot_follows = \"flow\"", "robot_follows = \"nothing\"")]);
     let with = foreseen(&[]);
     assert!(since_control(&with) < 0.08, "{with}");
