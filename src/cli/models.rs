@@ -10,7 +10,7 @@ use super::WrongArguments;
 use crate::identify::file::ModelFile;
 use crate::identify::library::{Entry, Library, TOLERANCE_C, Wanted};
 use crate::identify::quantity::Unit;
-use crate::io::model_file::{read, read_library};
+use crate::io::model_file::{Folder, read, read_library};
 
 /// Lists a folder of models, or tells which of them a cell would use.
 #[derive(Debug, Args)]
@@ -19,8 +19,10 @@ Examples:
   truebead models models/
   truebead models models/ --material PLA --nozzle-mm 0.4 --temperature-c 207
 
+A file that is no model is told, and the others are listed and found all the same.
+
 Exit status: 0 listed or found, 1 no such model or more than one, 2 wrong arguments
-or a file that is no model.")]
+or a list with a file that is no model.")]
 pub struct ModelsArgs {
     /// Folder of models, or the file of one
     #[arg(value_name = "FOLDER|MODEL.toml")]
@@ -61,15 +63,22 @@ pub fn parse_unit(word: &str) -> Result<Unit, String> {
 
 /// Runs the command; the answer goes to standard output.
 pub fn run(args: &ModelsArgs) -> Result<ExitCode> {
-    let library = if args.path.is_dir() {
+    let wanted = args.wanted()?;
+    let Folder { library, broken } = if args.path.is_dir() {
         read_library(&args.path)?
     } else {
         let name = args.path.display().to_string();
-        Library::new(vec![Entry { name, model: read(&args.path)? }])
+        let library = Library::new(vec![Entry { name, model: read(&args.path)? }]);
+        Folder { library, broken: Vec::new() }
     };
-    let Some(wanted) = args.wanted()? else {
-        table(library.entries());
-        return Ok(ExitCode::SUCCESS);
+    for broken in &broken {
+        tell!("{}: {broken}", if wanted.is_some() { "warning: not looked at" } else { "error" });
+    }
+    let Some(wanted) = wanted else {
+        if broken.is_empty() || !library.entries().is_empty() {
+            table(library.entries());
+        }
+        return Ok(ExitCode::from(if broken.is_empty() { 0 } else { 2 }));
     };
     let found = library.find(&wanted)?;
     table(std::slice::from_ref(found.entry));

@@ -39,9 +39,19 @@ pub fn read(path: &Path) -> Result<ModelFile, ModelFileError> {
     Ok(file::parse(&path.display().to_string(), &text)?)
 }
 
-/// Reads every `.toml` of a folder, not of those within it. Fails on the first
-/// one that is wrong: a model that was meant to be found must not be missed.
-pub fn read_library(folder: &Path) -> Result<Library, ModelFileError> {
+/// The models of a folder, and why others cannot be used.
+#[derive(Debug)]
+pub struct Folder {
+    /// Those that are sound.
+    pub library: Library,
+    /// What is wrong with each of the others, in the order of their names.
+    pub broken: Vec<ModelFileError>,
+}
+
+/// Reads every `.toml` of a folder, not of those within it. A file that is wrong
+/// does not hide the others: the caller tells of it, as a model that was meant to
+/// be found may be missed.
+pub fn read_library(folder: &Path) -> Result<Folder, ModelFileError> {
     let failed = |what| ModelFileError::Folder { path: folder.to_owned(), what };
     let mut paths = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
@@ -51,12 +61,15 @@ pub fn read_library(folder: &Path) -> Result<Library, ModelFileError> {
         }
     }
     paths.sort();
-    let entry = |path: &PathBuf| {
+    let (mut entries, mut broken) = (Vec::new(), Vec::new());
+    for path in paths {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Entry { name, model: read(path)? })
-    };
-    let entries: Result<Vec<Entry>, ModelFileError> = paths.iter().map(entry).collect();
-    Ok(Library::new(entries?))
+        match read(&path) {
+            Ok(model) => entries.push(Entry { name, model }),
+            Err(error) => broken.push(error),
+        }
+    }
+    Ok(Folder { library: Library::new(entries), broken })
 }
 
 #[cfg(test)]
@@ -66,16 +79,30 @@ mod tests {
     #[test]
     fn the_shipped_models_are_sound() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
-        assert!(!read_library(&folder).unwrap().entries().is_empty());
+        let found = read_library(&folder).unwrap();
+        assert!(!found.library.entries().is_empty() && found.broken.is_empty());
     }
 
     #[test]
-    fn a_model_that_is_wrong_or_missing_is_named() {
+    fn a_model_that_is_wrong_is_named_and_hides_no_other() {
+        let sound = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/example.toml");
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("a.toml"), "version = 1\n").unwrap();
+        fs::write(folder.path().join("b.toml"), [0xff]).unwrap();
+        fs::copy(sound, folder.path().join("c.toml")).unwrap();
         fs::write(folder.path().join("notes.txt"), "not a model").unwrap();
-        let said = read_library(folder.path()).unwrap_err().to_string();
-        assert!(said.contains("a.toml: 4 problems"), "{said}");
+        let found = read_library(folder.path()).unwrap();
+        let names: Vec<&str> =
+            found.library.entries().iter().map(|entry| entry.name.as_str()).collect();
+        assert_eq!(names, ["c.toml"]);
+        let said: Vec<String> = found.broken.iter().map(ModelFileError::to_string).collect();
+        assert!(said.len() == 2 && said[0].contains("a.toml: 4 problems"), "{said:?}");
+        assert!(said[1].contains("b.toml: "), "{said:?}");
+    }
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let folder = tempfile::tempdir().unwrap();
         let said = read_library(&folder.path().join("none")).unwrap_err().to_string();
         assert!(said.starts_with("folder of models"), "{said}");
         let said = read(&folder.path().join("none.toml")).unwrap_err().to_string();

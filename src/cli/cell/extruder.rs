@@ -46,8 +46,12 @@ pub fn file(part: &ExtruderPart, cell: &str) -> anyhow::Result<Option<ExtruderFi
             model: ModelSource::Library { folder, wanted },
             ..
         }) => {
-            let library = model_file::read_library(folder)?;
-            let found = library.find(wanted).map_err(|error| wrong(cell, &error.to_string()))?;
+            let read = model_file::read_library(folder)?;
+            for broken in &read.broken {
+                tell!("warning: this model is not looked at: {broken}");
+            }
+            let found =
+                read.library.find(wanted).map_err(|error| wrong(cell, &error.to_string()))?;
             tracing::info!(model = found.entry.name, off_c = found.off_c, "model of the cell");
             (folder.join(&found.entry.name), "model")
         }
