@@ -91,6 +91,8 @@ fn the_example_becomes_a_model_that_is_found_in_a_library() {
             "210",
             "--out",
             &at("models/pla"),
+            "--library",
+            &at("models"),
         ]),
         0,
     );
@@ -105,7 +107,10 @@ fn the_example_becomes_a_model_that_is_found_in_a_library() {
     let text = fs::read_to_string(at("models/pla/model.toml")).unwrap();
     assert!(file::parse("model.toml", &text).unwrap().transfer.is_stable());
     // In the library of a cell.
-    fs::write(at("models/pla-210.toml"), &text).unwrap();
+    let kept = "models/pla-0.4mm-210c-rpm-to-mm3_per_s.toml";
+    assert!(answer.contains(kept), "{answer}");
+    assert_eq!(fs::read_to_string(at(kept)).unwrap(), text);
+    fs::rename(at(kept), at("models/pla-210.toml")).unwrap();
     fs::write(at("models/petg.toml"), text.replace("\"PLA\"", "\"PETG\"")).unwrap();
     let list = said(&mut truebead(&["models", &at("models")]), 0);
     assert!(list.contains("petg.toml") && list.contains("pla-210.toml"), "{list}");
@@ -123,8 +128,39 @@ fn the_example_becomes_a_model_that_is_found_in_a_library() {
     let twice = said(&mut wanted("210"), 1);
     assert!(twice.contains("2 models for pla") && twice.contains("again.toml"), "{twice}");
     fs::write(at("models/wrong.toml"), text.replace("numerator", "nominator")).unwrap();
-    let wrong = said(&mut truebead(&["models", &at("models")]), 2);
+    fs::remove_file(at("models/again.toml")).unwrap();
+    let list = truebead(&["models", &at("models")]).assert().code(2).get_output().clone();
+    let [listed, wrong] = [list.stdout, list.stderr].map(|text| String::from_utf8(text).unwrap());
     assert!(wrong.contains("transfer.nominator: found an unknown key"), "{wrong}");
+    assert!(listed.contains("petg.toml") && !listed.contains("wrong.toml"), "{listed}");
+    let found = wanted("210").assert().code(0).get_output().clone();
+    let warned = String::from_utf8(found.stderr).unwrap();
+    assert!(warned.contains("warning: not looked at") && warned.contains("wrong.toml"), "{warned}");
+}
+
+#[test]
+fn no_model_is_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = log(folder.path(), |_| {});
+    let library = folder.path().join("library");
+    let holds_for = "--material PLA --nozzle-mm 0.4 --temperature-c 210 --library";
+    let keep = |out: &str, form: &str, code: i32| {
+        let mut command = truebead(&["identify"]);
+        let columns = ["--input", "screw_rpm", "--output", "flow_mm3_per_s", "--model", form];
+        command.arg(&log).args(columns).args(holds_for.split(' ')).arg(&library);
+        said(command.arg("--out").arg(folder.path().join(out)), code)
+    };
+    let first = keep("first", "sopdt", 0);
+    let taken = keep("first", "fopdt", 2);
+    assert!(taken.contains("model.toml is there already and would be lost"), "{taken}");
+    let kept = library.join("pla-0.4mm-210c-rpm-to-mm3_per_s.toml");
+    let text = fs::read_to_string(&kept).unwrap();
+    assert!(first.contains(kept.to_str().unwrap()), "{first}");
+    keep("again", "sopdt", 0);
+    let other = keep("other", "fopdt", 1);
+    assert!(other.contains("another model for the same") && other.contains("other/model.toml"));
+    assert_eq!(fs::read_to_string(&kept).unwrap(), text);
+    assert_eq!(fs::read_dir(&library).unwrap().count(), 1);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 mod bead;
 mod data;
 mod example;
+mod keep;
 mod list;
 mod options;
 mod source;
@@ -38,7 +39,8 @@ const VALIDATE_SHARE: f64 = 0.3;
 Examples:
   truebead identify --example example/
   truebead identify example/log.csv --input screw_rpm --output flow_mm3_per_s \\
-      --validate example/other.csv --material PLA --nozzle-mm 0.4 --temperature-c 210
+      --validate example/other.csv --material PLA --nozzle-mm 0.4 --temperature-c 210 \\
+      --library models
 
   truebead simulate cells/extruder-excite.toml --record --out excite
   truebead identify excite/recording.mcap
@@ -108,10 +110,21 @@ pub struct IdentifyArgs {
     /// Temperature of the material that it holds for [°C]
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
     temperature_c: Option<f64>,
-    /// Folder for model.toml, report.html and identify.json
+    /// Folder for model.toml, report.html and identify.json; one that holds a model
+    /// already is refused
     /// [default: model, or the first of model-2, model-3 … that is free]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Add the model to this folder as well, where cells look it up by material, nozzle
+    /// and temperature; another one for the same is never replaced
+    #[arg(
+        long,
+        value_name = "FOLDER",
+        requires = "material",
+        requires = "nozzle_mm",
+        requires = "temperature_c"
+    )]
+    library: Option<PathBuf>,
     /// Write a log of a simulated extruder to this folder, to try it with
     #[arg(long, value_name = "DIR", exclusive = true)]
     example: Option<PathBuf>,
@@ -135,31 +148,37 @@ pub fn run(args: &IdentifyArgs) -> Result<()> {
     if let Some(data) = args.data.as_ref().filter(|_| args.asks_for_columns()) {
         return list::write(data, &args.columns, &args.bead);
     }
+    let folder = args.out.clone().unwrap_or_else(|| free_folder("model"));
+    keep::refuse_taken(&folder)?;
     let (logs, doubts) = args.logs()?;
     let source = logs.source.clone();
     let forms = args.forms(&logs.estimation);
     let mut found = study(logs, &forms).with_context(|| source)?;
     found.warnings.splice(0..0, doubts);
-    let folder = args.out.clone().unwrap_or_else(|| free_folder("model"));
     say!("{}", text(&found).trim_end());
-    write(&found, setting, &folder)?;
-    say!("model      {}", folder.join("model.toml").display());
+    let model = write(&found, setting, &folder)?;
+    let path = folder.join(keep::MODEL);
+    say!("model      {}", path.display());
     say!("report     {}", folder.join("report.html").display());
+    if let Some(library) = &args.library {
+        say!("library    {}", keep::add(library, &model, &path)?.display());
+    }
     Ok(())
 }
 
-fn write(found: &Study, setting: Setting, folder: &Path) -> Result<()> {
+/// Writes all that is told of a model, and returns the text of its own file.
+fn write(found: &Study, setting: Setting, folder: &Path) -> Result<String> {
     make_folder(folder)?;
     let notes = [
         format!("Fitted by truebead {} to {}.", env!("CARGO_PKG_VERSION"), found.logs.source),
         text(found),
     ];
     let model = to_toml(&found.model(setting), &notes);
-    write_whole(folder, "model.toml", model.as_bytes())?;
+    write_whole(folder, keep::MODEL, model.as_bytes())?;
     let json = serde_json::to_vec_pretty(&to_json(found)).context("identify.json")?;
     write_whole(folder, "identify.json", &json)?;
     write_whole(folder, "report.html", page(found).as_bytes())?;
-    Ok(())
+    Ok(model)
 }
 
 fn validates_with_itself(other: &Path) -> anyhow::Error {
@@ -183,8 +202,11 @@ impl IdentifyArgs {
                 return Err(WrongArguments::new(format!("{name} {value}: expected {expected}")));
             }
         }
+        if self.material.as_ref().is_some_and(|name| name.trim().is_empty()) {
+            return Err(WrongArguments::new("--material: expected a name"));
+        }
         Ok(Setting {
-            material: self.material.clone().filter(|name| !name.trim().is_empty()),
+            material: self.material.clone(),
             nozzle_mm: self.nozzle_mm,
             temperature_c: self.temperature_c,
         })

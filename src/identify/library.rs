@@ -124,6 +124,23 @@ impl Library {
         &self.entries
     }
 
+    /// The model that holds for the same as this one, so that [`Library::find`]
+    /// could not tell the two apart.
+    pub fn same(&self, model: &ModelFile) -> Option<&Entry> {
+        let (setting, mut entries) = (&model.setting, self.entries.iter());
+        let material = setting.material.as_ref()?;
+        let (nozzle_mm, temperature_c) = (setting.nozzle_mm?, setting.temperature_c?);
+        entries.find(|entry| {
+            let other = &entry.model.setting;
+            let near = |value: Option<f64>, of: f64, by| value.is_some_and(|v| (v - of).abs() < by);
+            other.material.as_ref().is_some_and(|name| same_name(name, material))
+                && near(other.nozzle_mm, nozzle_mm, SAME_NOZZLE_MM)
+                && near(other.temperature_c, temperature_c, SAME_TEMPERATURE_C)
+                && entry.model.input.unit == model.input.unit
+                && entry.model.output.unit == model.output.unit
+        })
+    }
+
     /// The model of this material and nozzle whose temperature is the nearest
     /// within the tolerance. Models that do not tell all three are not looked
     /// at.
@@ -159,6 +176,19 @@ impl Library {
             }
         }
     }
+}
+
+/// What a model's file is called in a library, by what it holds for, such as
+/// `pla-0.4mm-210c-rpm-to-mm3_per_s.toml`; none where its material, nozzle or
+/// temperature is not told.
+pub fn file_name(model: &ModelFile) -> Option<String> {
+    let setting = &model.setting;
+    let material = setting.material.as_ref()?.trim().to_lowercase();
+    let plain = |c: char| if c.is_alphanumeric() { c } else { '-' };
+    let material: String = material.chars().map(plain).collect();
+    let (nozzle_mm, temperature_c) = (setting.nozzle_mm?, setting.temperature_c?);
+    let (input, output) = (model.input.unit.word(), model.output.unit.word());
+    Some(format!("{material}-{nozzle_mm}mm-{temperature_c}c-{input}-to-{output}.toml"))
 }
 
 fn same_name(a: &str, b: &str) -> bool {
@@ -241,6 +271,17 @@ mod tests {
         assert!(said.contains("petg.toml (PETG, 0.4 mm, 240 °C, rpm to mm³/s); pla-200"), "{said}");
         let none = Library::default().find(&wanted("PLA", 220.0)).unwrap_err().to_string();
         assert!(none.ends_with("there is no model at all"), "{none}");
+    }
+
+    #[test]
+    fn a_model_is_kept_under_what_it_holds_for() {
+        let model = |material, nozzle| entry("", material, nozzle, 210.0, Unit::Mm3PerS).model;
+        let name = file_name(&model("PLA+/grey ", 0.4)).unwrap();
+        assert_eq!(name, "pla--grey-0.4mm-210c-rpm-to-mm3_per_s.toml");
+        assert_eq!(library().same(&model("pla", 0.4)).unwrap().name, "pla-210.toml");
+        assert_eq!(library().same(&model("PLA", 0.8)), None);
+        let nothing = ModelFile { setting: Setting::default(), ..model("PLA", 0.4) };
+        assert!(file_name(&nothing).is_none() && library().same(&nothing).is_none());
     }
 
     #[test]
