@@ -8,6 +8,7 @@ use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
 use super::Voice;
+use crate::offline::reproduce::summary::Summary;
 use crate::offline::reproduce::{Effort, Reproduced, Row, Source, page, table};
 use crate::offline::{Progress, output};
 
@@ -61,7 +62,8 @@ pub fn run(args: &ReproduceArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     output::write_whole(&args.out, "reproduce.json", &json)?;
     output::write_whole(&args.out, "report.html", page(&done).as_bytes())?;
     for source in &done {
-        say!("{}\n\n{}\n{}\n", source.title, table::plain(&source.rows), source.about);
+        let (rows, met) = (table::plain(&source.rows), Summary::of(&source.rows).text());
+        say!("{}\n\n{rows}\n{met}\n{}\n", source.title, source.about);
     }
     say!("{}", args.out.join("report.html").display());
     Ok(ExitCode::SUCCESS)

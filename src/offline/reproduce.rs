@@ -5,6 +5,7 @@
 use maud::{Markup, html};
 use serde::Serialize;
 
+use self::summary::Summary;
 use super::Progress;
 use super::report::series::Series;
 use super::report::whole_page;
@@ -22,6 +23,7 @@ pub mod bcs_thesis;
 pub mod diagne2015;
 pub mod looey2026;
 pub mod ma2026;
+pub mod summary;
 pub mod table;
 
 /// One quantity of one experiment.
@@ -191,19 +193,21 @@ pub fn page(sources: &[Reproduced]) -> String {
     };
     let body = html! {
         h1 { (title) }
-        @for source in sources {
-            @if sources.len() > 1 { h1 { (source.title) } }
+        (summary::markup(sources))
+        @for (at, source) in sources.iter().enumerate() {
+            h1 id={ "source-" (at) } { (source.title) }
+            p { (Summary::of(&source.rows).text()) }
             p.hint { (source.about) }
-            section {
-                h2 { "Beside the published numbers" }
-                (table::markup(&source.rows))
-            }
             @for part in &source.sections {
                 section {
                     h2 { (part.heading) }
                     @if !part.hint.is_empty() { p.hint { (part.hint) } }
                     (part.drawing)
                 }
+            }
+            section {
+                h2 { "All numbers" }
+                div.wide { (table::markup(&source.rows)) }
             }
         }
         footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))

@@ -8,7 +8,7 @@ use crate::identify::experiment::Experiment;
 use crate::identify::quantity::Unit;
 use crate::offline::report::area::{Area, XAxis, round};
 use crate::offline::report::axis::{Scale, with_margin};
-use crate::offline::report::palette::{FLOW, Ink, MODEL, PRESSURE, SCREW, TARGET};
+use crate::offline::report::palette::{DEMAND, FLOW, Ink, MODEL, PRESSURE, SCREW, TARGET};
 use crate::offline::report::plot::{Layer, Plot, y_range};
 use crate::offline::report::sections::legend;
 use crate::offline::report::series::Series;
@@ -17,6 +17,8 @@ use crate::offline::report::series::Series;
 const POINTS: u32 = 400;
 /// A band is drawn this many standard deviations wide to either side.
 const WIDE: f64 = 2.0;
+/// What is left belongs neither to the model nor to the data.
+const LEFT: Ink = DEMAND;
 
 /// The colour of a quantity.
 fn ink(unit: Unit) -> Ink {
@@ -51,7 +53,7 @@ pub fn over_time(study: &Study, data: &Experiment, foretold: &[f64]) -> Markup {
         x: &axis,
         y_title: &above,
         y_range: y_range(&[&output, &model], &[]),
-        layers: vec![Layer::Curve(&output, ink(logs.output.unit)), Layer::Curve(&model, MODEL)],
+        layers: vec![Layer::Data(&output, ink(logs.output.unit)), Layer::Curve(&model, MODEL)],
     };
     let layer = if data.input_is_held {
         Layer::Stairs(&input, ink(logs.input.unit))
@@ -84,17 +86,18 @@ pub fn residuals(study: &Study) -> Markup {
         x: &axis,
         y_title: &title,
         y_range: y_range(&[&left], &[0.0]),
-        layers: vec![Layer::Level(0.0, TARGET, ""), Layer::Curve(&left, MODEL)],
+        layers: vec![Layer::Data(&left, LEFT), Layer::Level(0.0, TARGET, "")],
     };
     plot.draw()
 }
 
-/// How what the model leaves hangs together.
+/// How what the model leaves hangs together, from the first lag on: at none it
+/// is 1 whatever is left, and the rest would be drawn too small beside that.
 pub fn autocorrelation(study: &Study) -> Markup {
     let step_s = study.logs.estimation.step_s;
     let lags = &study.residuals.lags;
     let at = |k: usize| crate::offline::stats::as_f64(k as u64) * step_s;
-    let curve = series((0..lags.len()).map(at), lags.iter().copied());
+    let curve = series((1..lags.len()).map(at), lags.iter().copied().skip(1));
     let bound = study.residuals.bound;
     let axis = XAxis {
         title: "lag [s]".to_owned(),
@@ -105,11 +108,11 @@ pub fn autocorrelation(study: &Study) -> Markup {
         area: Area::wide(210.0),
         x: &axis,
         y_title: "autocorrelation of what is left",
-        y_range: y_range(&[&curve], &[0.0, 1.0]),
+        y_range: y_range(&[&curve], &[-2.0 * bound, 2.0 * bound]),
         layers: vec![
             Layer::Level(bound, TARGET, "99 % of white noise"),
             Layer::Level(-bound, TARGET, ""),
-            Layer::Curve(&curve, MODEL),
+            Layer::Curve(&curve, LEFT),
         ],
     };
     plot.draw()

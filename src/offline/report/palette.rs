@@ -43,8 +43,8 @@ pub const FLOW: Ink = ink("flow", [0, 138, 140], [64, 196, 196]);
 pub const PRESSURE: Ink = ink("pressure", [92, 72, 168], [160, 146, 230]);
 /// Speed of a screw or of a wheel, and whatever else an extruder is told.
 pub const SCREW: Ink = ink("screw", [150, 94, 40], [206, 152, 98]);
-/// What a model foretells.
-pub const MODEL: Ink = ink("model", [230, 159, 0], [240, 180, 60]);
+/// What a model foretells; stands out of the data under it.
+pub const MODEL: Ink = ink("model", [176, 16, 48], [255, 128, 128]);
 /// What a source's own method does, beside this program's.
 pub const PAPER: Ink = ink("paper", [213, 94, 0], [236, 122, 38]);
 /// What this program's best method does.

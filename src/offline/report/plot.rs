@@ -14,6 +14,8 @@ use super::series::{Point, Series, unbroken};
 pub enum Layer<'a> {
     /// A curve from sample to sample.
     Curve(&'a Series, Ink),
+    /// A pale curve of noisy data, for another to be seen over it.
+    Data(&'a Series, Ink),
     /// A thin dashed curve, for what is wished rather than done.
     Wish(&'a Series, Ink),
     /// A value that holds until the next one.
@@ -69,6 +71,7 @@ impl Plot<'_> {
         let place = |point: &Point| (round(x(point.0)), round(y.place(point.1)));
         match layer {
             Layer::Curve(series, ink) => curve(&series.points(), place, "curve", *ink),
+            Layer::Data(series, ink) => curve(&series.points(), place, "data", *ink),
             Layer::Wish(series, ink) => curve(&series.points(), place, "wish", *ink),
             Layer::Stairs(series, ink) => {
                 html! { path.stairs d=(stairs(&series.points(), place)) stroke=(ink.css()) {} }

@@ -217,12 +217,12 @@ fn draw_stand_off(curve: &[StandOff]) -> Markup {
         x: &axis,
         y_title: "error of the width [mm]",
         y_range: y_range(&[&scale, &full], &[]),
-        layers: vec![Drawn::Curve(&scale, palette::REJECTED), Drawn::Curve(&full, palette::WIDTH)],
+        layers: vec![Drawn::Curve(&scale, palette::PAPER), Drawn::Curve(&full, palette::OURS)],
     };
     html! {
         (legend(&[
-            ("single scale, as published", palette::REJECTED, ""),
-            ("full calibration, height given", palette::WIDTH, ""),
+            ("single scale, as in the paper", palette::PAPER, ""),
+            ("ours: full calibration, height given", palette::OURS, ""),
         ]))
         (plot.draw())
     }

@@ -316,8 +316,8 @@ fn draw_fits(table: &FitTable) -> Markup {
     let (published, simulated) =
         (orders(|row| row.published_percent), orders(|row| row.simulated_percent));
     let fits = [
-        (published.as_slice(), "published", palette::PAPER),
-        (simulated.as_slice(), "simulated", palette::OURS),
+        (published.as_slice(), "published", palette::TARGET),
+        (simulated.as_slice(), "simulated", palette::PAPER),
     ];
     let names: Vec<String> = (1..)
         .zip(&table.rows)
@@ -385,6 +385,6 @@ fn time(run: &Run) -> XAxis {
 fn draw_sensing(found: &[(f64, f64)], bound: &[(f64, f64)]) -> Markup {
     let range = (0.0, bound.last().map_or(1.0, |(mm, _)| *mm));
     let axis = XAxis { title: "camera behind the nozzle [mm]".to_owned(), range, divisor: 1.0 };
-    let curves = [(bound, "bound", palette::LIMIT), (found, "simulated", palette::OURS)];
+    let curves = [(bound, "bound", palette::LIMIT), (found, "ours", palette::OURS)];
     plot("area RMSE, off over on", &axis, &curves, None)
 }

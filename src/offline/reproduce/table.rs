@@ -33,12 +33,17 @@ pub fn plain(rows: &[Row]) -> String {
 pub fn markup(rows: &[Row]) -> Markup {
     html! {
         table {
-            thead { tr { @for head in HEADS { th { (head) } } } }
+            thead { tr {
+                @for head in &HEADS[..3] { th { (head) } }
+                @for head in &HEADS[3..] { th.number { (head) } }
+            } }
             tbody { @for row in rows { tr {
                 td { (row.case) }
                 td { (row.quantity) }
                 td { (row.unit) }
-                @for value in [row.published, row.simulated, row.ours] { td { (number(value)) } }
+                @for value in [row.published, row.simulated, row.ours] {
+                    td.number { (number(value)) }
+                }
             } } }
         }
     }

@@ -57,14 +57,15 @@ pub fn curves(
     }
 }
 
-/// Our step responses with every single error of the model.
+/// Our step responses with every single error of the model, each in a colour
+/// that stands for no method.
 pub fn singles(drawn: &[Course]) -> Markup {
     let inks = [
-        palette::PAPER,
-        palette::OURS,
+        palette::PRIMING,
+        palette::HOLDING,
         palette::MODEL,
         palette::PRESSURE,
-        palette::FLOW,
+        palette::TRACKING,
         palette::SCREW,
     ];
     let named: Vec<Named> = Factors::singles()
