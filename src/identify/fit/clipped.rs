@@ -11,9 +11,13 @@ const RUN: usize = 3;
 const CUT_SHARE: f64 = 0.02;
 /// Times that a command comes to an end of its range before that is a cut.
 const ARRIVALS: usize = 3;
-/// A stretch that leaves its chord by less than this share of its height is the
-/// ramp of a drive that takes steps no faster.
-const STRAIGHT: f64 = 0.005;
+/// A command that goes back and forth by more than this share of its range has
+/// turned between its ends.
+const TURN: f64 = 0.05;
+/// Steps that differ by less than this share are of one rate.
+const RATE: f64 = 0.02;
+/// A stretch that loses more than this share of its pace is no ramp.
+const BEND: f64 = 0.003;
 /// A command that slows down to less than this share of its mean step before it
 /// stands has settled there, and was not cut off.
 const ABRUPT: f64 = 0.5;
@@ -103,7 +107,8 @@ impl Samples {
     pub fn check_clipped(&self) -> Result<(), Clipped> {
         for (column, row) in [(Column::Input, self.input()), (Column::Output, self.output())] {
             let signal = Signal::new(row);
-            let is_command = column == Column::Input && signal.is_held();
+            let is_command =
+                column == Column::Input && (signal.is_held() || signal.is_at_one_rate());
             for (end, value) in signal.ends() {
                 let is_cut =
                     if is_command { signal.is_cut_command(value) } else { signal.varies() };
@@ -143,6 +148,11 @@ impl<'a> Signal<'a> {
         2 * held.sum::<usize>() > self.row.len()
     }
 
+    /// Whether it changes at one rate, and stands in between.
+    fn is_at_one_rate(&self) -> bool {
+        is_at_one_rate(self.row, self.grain())
+    }
+
     /// Whether it seldom repeats a sample between its ends.
     fn varies(&self) -> bool {
         let between = || self.runs.iter().filter(|run| !self.is_end(run[0]));
@@ -156,13 +166,28 @@ impl<'a> Signal<'a> {
         self.runs_into(end) || self.piles_up(end)
     }
 
-    /// Whether it comes to this end over samples that are neither held nor on a
-    /// straight ramp, without slowing down, most of the times that it does.
+    /// Whether it comes to this end as a varied signal does that would go on
+    /// beyond it: without slowing down, after it has turned between its ends or on
+    /// a bend. A drive that takes steps no faster comes on a straight ramp, one
+    /// that settles slows down.
     fn runs_into(&self, end: f64) -> bool {
         let at_end = || self.stands().filter(|stand| stand.value == end && stand.is_inside);
-        let is_abrupt = |stand: &Stand<'_>| stand.pace >= ABRUPT && !is_straight(stand.before);
-        let abrupt = at_end().filter(is_abrupt).count();
-        abrupt >= ARRIVALS && 2 * abrupt > at_end().count()
+        let abrupt = || at_end().filter(|stand| stand.pace >= ABRUPT).map(|stand| stand.before);
+        let (grain, total) = (self.grain(), at_end().count());
+        let range = self.range[1] - self.range[0];
+        let has_turned =
+            |stretch: &&[f64]| turns(stretch) > TURN * range && !is_at_one_rate(stretch, grain);
+        let turned = abrupt().filter(has_turned).count();
+        let bent = abrupt().filter(|stretch| is_bent(stretch, grain)).count();
+        (turned >= ARRIVALS && 5 * turned >= total) || (bent > ARRIVALS && 5 * bent >= 4 * total)
+    }
+
+    /// The smallest difference between two samples, as a log rounds them.
+    fn grain(&self) -> f64 {
+        let mut sorted = self.row.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let steps = sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0);
+        steps.fold(f64::INFINITY, f64::min)
     }
 
     /// Whether it holds many levels one after the other, each about once, but
@@ -241,14 +266,37 @@ struct Stand<'a> {
     pace: f64,
 }
 
-/// Whether a stretch lies on its chord, as far as two samples and more can.
-#[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
-fn is_straight(stretch: &[f64]) -> bool {
-    let [first, _, .., last] = *stretch else { return true };
-    let slope = (last - first) / (stretch.len() - 1) as f64;
-    let off = stretch.iter().enumerate().map(|(k, value)| (value - first - slope * k as f64).abs());
-    let [least, most] = ends(stretch);
-    off.fold(0.0, f64::max) <= STRAIGHT * (most - least)
+/// How far a stretch goes back and forth.
+fn turns(stretch: &[f64]) -> f64 {
+    let way: f64 = stretch.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum();
+    way - ends_apart(stretch)
+}
+
+/// From its first sample to its last.
+fn ends_apart(stretch: &[f64]) -> f64 {
+    let ends = stretch.first().zip(stretch.last());
+    ends.map_or(0.0, |(first, last)| (last - first).abs())
+}
+
+/// Whether nearly all changes from sample to sample are as large as their median,
+/// as those of a drive are that takes steps no faster.
+fn is_at_one_rate(stretch: &[f64], grain: f64) -> bool {
+    let steps = stretch.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
+    steps.sort_by(f64::total_cmp);
+    let median = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+    let near = |step: &&f64| (**step - median).abs() <= RATE.mul_add(median, 1.01 * grain);
+    5 * steps.iter().filter(near).count() >= 4 * steps.len()
+}
+
+/// Whether the last third of a stretch is less steep than the middle one, by
+/// more than the rounding of its samples.
+fn is_bent(stretch: &[f64], grain: f64) -> bool {
+    let third = stretch.len().saturating_sub(1) / 3;
+    let last = stretch.get(stretch.len().saturating_sub(third + 1)..).unwrap_or_default();
+    let middle = stretch.get(third..=2 * third).unwrap_or_default();
+    let (last, middle) = (ends_apart(last), ends_apart(middle));
+    third > 0 && middle - last > BEND.mul_add(middle, 2.0 * grain)
 }
 
 #[cfg(test)]

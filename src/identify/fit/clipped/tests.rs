@@ -51,14 +51,18 @@ fn through(row: &[f64], digits: f64, step: impl Fn(f64, f64) -> f64) -> Vec<f64>
 fn a_varied_input_that_stands_at_its_limits_is_cut_off() {
     // Twice as far as the limits let it, a single wave and several of them.
     let sine = times().map(|t| (30.0 + 20.0 * libm::sin(2.0 * t)).clamp(20.0, 40.0));
+    let steep = times().map(|t| (30.0 + 20.0 * libm::sin(2.5 * t)).clamp(25.0, 35.0));
     let waves = times().map(|t| libm::sin(1.3 * t) + libm::sin(2.9 * t) + libm::sin(0.37 * t));
     let waves = waves.map(|u| u.clamp(-0.4, 0.4));
     let noise: Vec<f64> = gaussian(3000);
     let noise = through(&noise, 1e9, |at, to| at + 0.1 * (to - at));
     let noise: Vec<f64> = noise.iter().map(|u| u.clamp(29.5, 30.5)).collect();
-    for (row, limits) in
-        [(sine.collect(), [20.0, 40.0]), (waves.collect(), [-0.4, 0.4]), (noise, [29.5, 30.5])]
-    {
+    for (row, limits) in [
+        (sine.collect(), [20.0, 40.0]),
+        (steep.collect(), [25.0, 35.0]),
+        (waves.collect(), [-0.4, 0.4]),
+        (noise, [29.5, 30.5]),
+    ] {
         let cut = input(row).unwrap_err();
         assert!(cut.column == Column::Input && limits.contains(&cut.value), "{cut}");
         assert!(cut.share_percent > 10.0 && cut.longest > RUN, "{cut}");
@@ -84,11 +88,18 @@ fn what_steps_between_levels_is_not_cut_off() {
     // A drive that takes so much a sample, one that settles, and both rounded as logs are.
     for digits in [1e9, 1e3, 10.0] {
         let ramps = through(&binary, digits, |at, to| at + (to - at).clamp(-1.3, 1.3));
-        assert_eq!(input(ramps), Ok(()), "ramps, {digits}");
+        // A sample that comes late now and then.
+        let mut late = ramps.clone();
+        (0..late.len() - 1).filter(|k| k % 11 == 3).for_each(|k| late[k] = ramps[k + 1]);
+        assert_eq!((input(ramps), input(late)), (Ok(()), Ok(())), "ramps, {digits}");
         for pace in [0.1, 0.25, 0.6] {
             let settling = through(&binary, digits, |at, to| at + pace * (to - at));
             assert_eq!(input(settling), Ok(()), "settling by {pace}, {digits}");
         }
+    }
+    for rate in [0.37, 0.83, 1.27, 2.9] {
+        let ramps = through(&binary, 10.0, |at, to| at + (to - at).clamp(-rate, rate));
+        assert_eq!(input(ramps), Ok(()), "{rate}");
     }
     // Means over samples that do not keep step with the command's.
     let means = binary.windows(2).enumerate().map(|(k, pair)| {
