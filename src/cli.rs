@@ -53,7 +53,7 @@ use std::process::ExitCode;
 use clap::{ArgAction, Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-use crate::config::Problems;
+use crate::document::Problems;
 use crate::io::calibration_file::CalibrationFileError;
 use crate::io::model_file::ModelFileError;
 

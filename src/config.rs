@@ -4,9 +4,6 @@
 pub mod cell;
 pub mod control;
 pub mod extruder;
-pub mod problem;
 pub mod rendered;
-pub mod table;
 
 pub use cell::{Camera, Cell, Mount, Recording, Robot, Source};
-pub use problem::{Problem, Problems};

@@ -23,6 +23,7 @@ pub mod cli;
 pub mod config;
 pub mod control;
 pub mod controller;
+pub mod document;
 pub mod extruder;
 pub mod frame;
 pub mod geometry;

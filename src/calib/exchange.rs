@@ -11,7 +11,7 @@ mod write;
 mod yaml;
 
 use super::Camera;
-use crate::config::Problems;
+use crate::document::Problems;
 use fields::Fields;
 
 /// Whose layout a file has.

@@ -8,8 +8,8 @@ use nalgebra::{Point3, Vector3};
 use super::camera::COEFFICIENTS;
 use super::lens::Lens;
 use super::{Calibration, Camera, Quality};
-use crate::config::Problems;
-use crate::config::table::{Document, Table};
+use crate::document::Problems;
+use crate::document::{Document, Table};
 use crate::geometry::Pose;
 use crate::units::Mm;
 

@@ -5,11 +5,11 @@
 use std::path::{Path, PathBuf};
 
 use super::control::{self, Control};
-use super::problem::Problems;
 use super::rendered::{self, Simulation};
-use super::table::{Document, Table};
 use crate::calib::{Calibration, SurfaceMap};
 use crate::control::limiter::Limits;
+use crate::document::Problems;
+use crate::document::{Document, Table};
 use crate::frame::Channel;
 use crate::geometry::Roi;
 use crate::time::Span;

@@ -1,8 +1,8 @@
 //! `[control]` and `[limits]`: what the controller is to do, and what it may.
 
-use super::table::Table;
 use crate::control::limiter::Limits;
 use crate::control::pi::PiGains;
+use crate::document::Table;
 use crate::time::Span;
 use crate::units::{Mm, MmPerS, MmPerS2};
 

@@ -17,7 +17,7 @@ pub use part::ExtruderPart;
 pub use plant::{ExtruderPlant, LinearPlant, PlantKind, PressurePlant, ScrewPlant};
 pub use strategy::{FeedforwardKeys, ModelSource, Strategy};
 
-use super::table::Table;
+use crate::document::Table;
 use crate::extruder::demand::section;
 use crate::extruder::{
     CommandLimits, Drive, ExtruderSetup, FlowDemand, Follows, Law, RobotFollows,

@@ -3,7 +3,7 @@
 //! are the plant fitted to Shojaei Barjuei et al. 2022; nothing here moves a
 //! real robot.
 
-use super::table::Table;
+use crate::document::Table;
 use crate::sim::bead::{BeadModel, Roughness};
 use crate::sim::disturbance::Flow;
 use crate::sim::picture::{

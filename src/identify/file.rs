@@ -2,8 +2,8 @@
 
 mod write;
 
-use crate::config::Problems;
-use crate::config::table::{Document, Table};
+use crate::document::Problems;
+use crate::document::{Document, Table};
 use crate::identify::quantity::{Quantity, Unit};
 use crate::model::TransferFunction;
 

@@ -5,7 +5,7 @@ use std::{fs, io};
 
 use crate::calib::exchange::{self, Import};
 use crate::calib::{Calibration, file};
-use crate::config::Problems;
+use crate::document::Problems;
 
 /// Bytes of a camera in the YAML of others, at most.
 const LONGEST_YAML: u64 = 1_000_000;

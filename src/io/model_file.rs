@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use crate::config::Problems;
+use crate::document::Problems;
 use crate::identify::file::{self, ModelFile};
 use crate::identify::library::{Entry, Library};
 

@@ -9,7 +9,7 @@ use self::summary::Summary;
 use super::Progress;
 use super::report::series::Series;
 use super::report::whole_page;
-use crate::config::Problems;
+use crate::document::Problems;
 use crate::extruder::adaptive::SubSystemError;
 use crate::extruder::feedforward::FeedforwardError;
 use crate::extruder::pressure::PressureError;

@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 
 use super::yaml::{Node, Value};
 use crate::calib::file::MAX_SIDE_PX;
-use crate::config::problem::Problem;
+use crate::document::Problem;
 
 /// Names that one thing goes by, in small letters and without `_`.
 pub type Names = &'static [&'static str];

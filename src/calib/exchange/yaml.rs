@@ -3,7 +3,7 @@
 
 use saphyr_parser::{Event, Parser, ScalarStyle, ScanError};
 
-use crate::config::problem::Problem;
+use crate::document::Problem;
 
 /// Calibrations are nested three deep.
 const DEEPEST: usize = 32;

@@ -2,7 +2,7 @@
 //! for, and its gains. There are no defaults for gains.
 
 use super::About;
-use crate::config::table::Table;
+use crate::document::Table;
 use crate::extruder::adaptive::{Adaptation, FirstOrder, Gains, Law, Safety};
 use crate::extruder::law::NozzleModel;
 use crate::time::Span;

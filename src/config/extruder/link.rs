@@ -1,7 +1,7 @@
 //! `driver` of `[extruder]` and what belongs to it: how a live run reaches the
 //! extruder. A simulated cell needs none of it.
 
-use crate::config::table::Table;
+use crate::document::Table;
 
 /// How long a command holds at the extruder unless the file says so \[ms\].
 const VALID_MS: u64 = 300;

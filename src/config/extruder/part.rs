@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::{Extruder, ExtruderPlant, PlantKind, Strategy};
 use crate::config::rendered::Simulation;
-use crate::config::table::Table;
+use crate::document::Table;
 use crate::extruder::law::Need;
 use crate::extruder::{Drive, FlowDemand};
 use crate::units::{Mm, Mm3PerS, MmPerS};

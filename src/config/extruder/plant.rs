@@ -3,7 +3,7 @@
 
 use super::pressure::{read_nozzle, read_process};
 use super::screw::read_screw;
-use crate::config::table::Table;
+use crate::document::Table;
 use crate::extruder::law::Need;
 use crate::extruder::pressure::Fopdt;
 use crate::extruder::rheology::PowerLaw;

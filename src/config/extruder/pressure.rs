@@ -2,7 +2,7 @@
 //! the nozzle, the nozzle's power law, and which law holds the pressure.
 
 use super::About;
-use crate::config::table::Table;
+use crate::document::Table;
 use crate::extruder::law::{PressureChoice, PressureSettings};
 use crate::extruder::pressure::Fopdt;
 use crate::extruder::pressure::kalman::Noise;

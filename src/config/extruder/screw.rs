@@ -2,7 +2,7 @@
 //! its predictor; and the same screw in a simulated cell.
 
 use super::About;
-use crate::config::table::Table;
+use crate::document::Table;
 use crate::extruder::screw::control::{Scheme, ScrewSettings};
 use crate::extruder::screw::feasible::Feasibility;
 use crate::extruder::screw::law::Setpoint;

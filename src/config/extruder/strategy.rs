@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{ANY, About, adaptive, keys, pressure, screw};
-use crate::config::table::Table;
+use crate::document::Table;
 use crate::extruder::Drive;
 use crate::extruder::adaptive::Law as AdaptiveLaw;
 use crate::extruder::feedforward::RightZeros;

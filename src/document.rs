@@ -1,6 +1,8 @@
 //! A cursor over a TOML file that takes what it is asked for and collects
 //! every violation on the way, with its line, instead of ending at the first.
 
+mod problem;
+
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
@@ -8,7 +10,7 @@ use std::ops::RangeInclusive;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::problem::{Problem, Problems};
+pub use self::problem::{Problem, Problems};
 
 /// A parsed file and what was found wrong with it so far.
 pub struct Document<'a> {
