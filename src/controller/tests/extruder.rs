@@ -5,7 +5,7 @@ use super::*;
 use crate::extruder::law::{Constant, Played};
 use crate::extruder::{
     CommandLimits, Drive, ExtruderCommand, ExtruderFault, ExtruderHold, ExtruderReport,
-    ExtruderState, Follows, Law, PumpMode,
+    ExtruderState, Follows, Law, PumpMode, RobotFollows,
 };
 use crate::identify::profile::{Point, Profile};
 use crate::units::{Mm2, Rpm};
@@ -24,6 +24,7 @@ fn rig(law: Law) -> (ExtruderSetup, FlowDemand) {
         max_gap: Span::from_millis(200),
         max_hold: Span::from_secs(1.0),
         max_pressure: None,
+        robot_follows: RobotFollows::Nothing,
     };
     let demand = FlowDemand::new(Mm2::constant(10.0), MmPerS::constant(SPEED), Follows::Robot);
     (setup, demand)
