@@ -177,7 +177,7 @@ mod tests {
             time_constant_s,
             right_zeros: RightZeros::Refuse,
             known_ahead: Span::ZERO,
-            late: Span::ZERO,
+            late: Span::from_secs(1.0),
             limits,
             period: PERIOD,
         };
