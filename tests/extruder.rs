@@ -1,11 +1,6 @@
 //! The extruder side as a user meets it: cell files, simulation, messages.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::disallowed_methods,
-    reason = "a test may fail"
-)]
+#![allow(clippy::unwrap_used, clippy::disallowed_methods, reason = "a test may fail")]
 
 use std::fs;
 use std::path::Path;
@@ -13,13 +8,6 @@ use std::process::Output;
 
 use assert_cmd::Command;
 use assert_cmd::cargo::cargo_bin;
-use truebead::cli::cell::LoadedCell;
-use truebead::config::cell::Purpose;
-use truebead::control::{Event, Step};
-use truebead::runner::NoRecorder;
-use truebead::sim::cell::{Sight, SimCell, Witness};
-use truebead::time::Stamp;
-use truebead::units::{Mm, Mm3PerS};
 
 const CELL: &str = include_str!("../cells/extruder.toml");
 
@@ -207,6 +195,49 @@ fn check_says_what_a_cell_suffices_for_and_what_is_missing() {
     assert!(runs.contains("not for simulate;") && runs.contains("extruder_plant"), "{runs}");
 }
 
+/// Simulates the shipped cell with the model's inverse, some lines changed.
+fn foreseen(changes: &[(&str, &str)]) -> serde_json::Value {
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
+    let mut text = include_str!("../cells/extruder-feedforward.toml")
+        .replace("../models", &models.display().to_string());
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from}");
+        text = text.replace(from, to);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("cell.toml"), text).unwrap();
+    let output = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let summary = fs::read_to_string(folder.path().join("out/summary.json")).unwrap();
+    serde_json::from_str(&summary).unwrap()
+}
+
+#[test]
+fn a_robot_that_goes_by_the_flow_has_its_width_while_the_extruder_runs_up() {
+    let since_control =
+        |summary: &serde_json::Value| summary["width_error_rms_mm"].as_f64().unwrap();
+    let alone = foreseen(&[("robot_follows = \"flow\"", "robot_follows = \"nothing\"")]);
+    let with = foreseen(&[]);
+    assert!(since_control(&with) < 0.08, "{with}");
+    assert!(2.0 * since_control(&with) < since_control(&alone), "{with} {alone}");
+    // A screw that follows late is known by its encoder.
+    let plant = "start_delay_s = 0.1";
+    let late = format!("{plant}\nscrew_lag_s = 0.3");
+    let blind = foreseen(&[(plant, &late)]);
+    let key = "robot_follows = \"flow\"";
+    let seen = foreseen(&[(plant, &late), (key, &format!("{key}\nforetold_from = \"encoder\""))]);
+    assert!(since_control(&seen) < 0.75 * since_control(&blind), "{seen} {blind}");
+}
+
+#[test]
+fn a_robot_and_a_flow_do_not_follow_each_other() {
+    let flow = "follows = \"robot\"\nrobot_follows = \"flow\"\nmax_gap_s = 0.2 ";
+    let (status, said, _) = simulated(&[("max_gap_s = 0.2 ", flow)]);
+    assert_eq!(status, Some(2));
+    assert!(said.contains("extruder.follows"), "{said}");
+    assert!(said.contains("expected strategy = \"feedforward\""), "{said}");
+}
+
 /// What a user of a shipped cell relies on: it runs from the first to the last
 /// moment of the bead, nothing is missed, limits hardly act, and the robot
 /// brings the width to its target with the flow that comes.
@@ -326,80 +357,4 @@ fn a_simulation_that_is_ended_leaves_what_it_has() {
         .collect();
     names.sort();
     assert_eq!(names, ["recording.mcap", "report.html", "summary.json", "widths.csv"]);
-}
-
-/// The largest error of the flow on each bead, from one to three seconds after
-/// its beginning, as a share of what is wanted.
-#[derive(Default)]
-struct Beads {
-    began: Option<Stamp>,
-    worst: Vec<f64>,
-}
-
-impl Witness for Beads {
-    fn step(&mut self, _: Stamp, _: &Event, _: &Step) {}
-    fn look(&mut self, _: &Sight<'_>) {}
-
-    fn flow(&mut self, now: Stamp, wanted: Option<Mm3PerS>, flow: Mm3PerS) {
-        let Some(wanted) = wanted else {
-            self.began = None;
-            return;
-        };
-        let began = *self.began.get_or_insert_with(|| {
-            self.worst.push(0.0);
-            now
-        });
-        if (1.0..3.0).contains(&(now - began).secs()) {
-            let worst = self.worst.last_mut().unwrap();
-            *worst = worst.max((flow.get() / wanted.get() - 1.0).abs());
-        }
-    }
-}
-
-#[test]
-fn what_was_learnt_on_one_bead_holds_on_the_next() {
-    let loaded = LoadedCell::read(&cells().join("extruder-adaptive.toml"), Purpose::Run).unwrap();
-    let (run, rig) = (loaded.cell.run.clone().unwrap(), loaded.simulated_extruder().unwrap());
-    let calibration = loaded.calibration.clone();
-    let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, NoRecorder, rig).unwrap();
-    let mut beads = Beads::default();
-    for layer in 0..3_u8 {
-        assert!(sim.layer(Mm::constant(20.0 * f64::from(layer)), &mut beads).whole);
-    }
-    let [first, others @ ..] = beads.worst.as_slice() else { panic!("no bead") };
-    assert_eq!(others.len(), 2);
-    assert!(others.iter().all(|worst| 2.0 * worst < *first), "{first} {others:?}");
-}
-
-/// The shipped cell with the model's inverse, some lines changed.
-fn foreseen(changes: &[(&str, &str)]) -> serde_json::Value {
-    let cell = include_str!("../cells/extruder-feedforward.toml");
-    let (status, said, summary) = simulated_cell(cell, changes);
-    assert_eq!(status, Some(0), "{said}");
-    summary
-}
-
-#[test]
-fn a_robot_that_goes_by_the_flow_has_its_width_while_the_extruder_runs_up() {
-    let since_control = |summary: &serde_json::Value| number(summary, "width_error_rms_mm");
-    let alone = foreseen(&[("robot_follows = \"flow\"", "robot_follows = \"nothing\"")]);
-    let with = foreseen(&[]);
-    assert!(since_control(&with) < 0.08, "{with}");
-    assert!(2.0 * since_control(&with) < since_control(&alone), "{with} {alone}");
-    // A screw that follows late is known by its encoder.
-    let plant = "start_delay_s = 0.1";
-    let late = format!("{plant}\nscrew_lag_s = 0.3");
-    let blind = foreseen(&[(plant, &late)]);
-    let key = "robot_follows = \"flow\"";
-    let seen = foreseen(&[(plant, &late), (key, &format!("{key}\nforetold_from = \"encoder\""))]);
-    assert!(since_control(&seen) < 0.75 * since_control(&blind), "{seen} {blind}");
-}
-
-#[test]
-fn a_robot_and_a_flow_do_not_follow_each_other() {
-    let flow = "follows = \"robot\"\nrobot_follows = \"flow\"\nmax_gap_s = 0.2 ";
-    let (status, said, _) = simulated(&[("max_gap_s = 0.2 ", flow)]);
-    assert_eq!(status, Some(2));
-    assert!(said.contains("extruder.follows"), "{said}");
-    assert!(said.contains("expected strategy = \"feedforward\""), "{said}");
 }
