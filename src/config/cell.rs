@@ -2,7 +2,12 @@
 //! recording, and for a simulated bead what it is made of. See the README for
 //! every key.
 
-use std::path::{Path, PathBuf};
+mod calibration;
+mod camera;
+mod gauge;
+mod robot;
+
+use std::path::Path;
 
 use super::control::{self, Control};
 use super::rendered::{self, Simulation};
@@ -11,17 +16,18 @@ use crate::control::limiter::Limits;
 use crate::document::Problems;
 use crate::document::{Document, Table};
 use crate::frame::Channel;
-use crate::geometry::Roi;
-use crate::time::Span;
-use crate::units::{Mm, MmPerS};
-use crate::vision::{Axis, Gauge, Method, Polarity};
+use crate::units::Mm;
+use crate::vision::Gauge;
 
 pub use super::extruder::ExtruderPart;
+pub use calibration::CalibrationSource;
+pub use camera::{Camera, Mount, Source};
+pub use robot::Robot;
 
-/// Largest image side that is taken \[px\].
-const MAX_SIDE_PX: f64 = 65_536.0;
-/// Sizes of a pixel at the surface that are taken \[mm/px\].
-const SCALE_MM_PER_PX: std::ops::RangeInclusive<f64> = 1e-6..=1e3;
+use calibration::read_calibration;
+use camera::{read_camera, read_mount};
+use gauge::{read_channel, read_gauge};
+use robot::read_robot;
 
 /// What a cell file is read for; keys that a purpose does not need may be
 /// absent.
@@ -75,94 +81,6 @@ pub struct RunPart {
     pub robot: Robot,
     /// The extruder, where it is commanded.
     pub extruder: Option<ExtruderPart>,
-}
-
-/// Where the calibration comes from.
-#[derive(Debug, Clone, PartialEq)]
-pub enum CalibrationSource {
-    /// A calibration file.
-    File(PathBuf),
-    /// The single number of the 2022 paper.
-    Scale {
-        /// Millimetres a pixel at the surface.
-        mm_per_px: f64,
-        /// Its standard deviation \[mm/px\], if the file says so.
-        sigma: Option<f64>,
-    },
-}
-
-/// Where frames come from.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Source {
-    /// A folder of images, a video file or an MCAP.
-    Path(PathBuf),
-    /// A live camera by its index.
-    Index(i32),
-    /// A `GStreamer` pipeline.
-    Pipeline(String),
-    /// A network camera's snapshot address.
-    Url(String),
-    /// The simulated bead.
-    Rendered,
-}
-
-impl Source {
-    /// The source that a name means; paths are relative to a folder. `None` for a camera
-    /// without a whole number.
-    pub fn parse(name: &str, folder: &Path) -> Option<Self> {
-        if name == "rendered" {
-            Some(Self::Rendered)
-        } else if let Some(index) = name.strip_prefix("camera:") {
-            index.trim().parse().ok().filter(|index| *index >= 0).map(Self::Index)
-        } else if let Some(pipeline) = name.strip_prefix("gst:") {
-            Some(Self::Pipeline(pipeline.trim().to_string()))
-        } else if name.starts_with("http://") || name.starts_with("https://") {
-            Some(Self::Url(name.to_string()))
-        } else {
-            Some(Self::Path(folder.join(name)))
-        }
-    }
-}
-
-/// How a camera rides.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mount {
-    /// With the nozzle; it rises with the layers.
-    Flange,
-    /// It stands still.
-    Fixed,
-}
-
-/// The camera of a cell.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Camera {
-    /// Where frames come from.
-    pub source: Source,
-    /// The source as the file names it.
-    pub source_name: String,
-    /// Frames a second.
-    pub rate_hz: f64,
-    /// How it rides.
-    pub mount: Mount,
-    /// Path length from the nozzle back to the middle of the gauge.
-    pub offset: Mm,
-    /// Longest wait for a frame before the camera counts as lost.
-    pub deadline: Span,
-}
-
-/// The robot of a cell.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Robot {
-    /// Host and port of the robot controller.
-    pub address: String,
-    /// Setpoints a second.
-    pub rate_hz: f64,
-    /// Speed of the first stretch.
-    pub start_speed: MmPerS,
-    /// Path length at the start speed before control begins.
-    pub start_length: Mm,
-    /// How long a setpoint holds on the robot \[ms\].
-    pub valid_ms: u32,
 }
 
 /// Which frames a recording keeps.
@@ -249,163 +167,6 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
         recording: recording?,
         run,
         simulation: simulation?,
-    })
-}
-
-fn read_calibration(table: &Table<'_>, folder: &Path) -> Option<CalibrationSource> {
-    let file = table.optional_text("file");
-    let scale = table.optional_number("mm_per_px", SCALE_MM_PER_PX);
-    let sigma = read_scale_sigma(table, scale);
-    match (table.has("file"), table.has("mm_per_px")) {
-        (true, true) => {
-            table.report("mm_per_px", "a scale beside a file", "one of file and mm_per_px");
-            None
-        }
-        (false, false) => {
-            table.report("file", "nothing", "a calibration file, or mm_per_px = a number");
-            None
-        }
-        (true, false) => file.map(|name| CalibrationSource::File(folder.join(name))),
-        (false, true) => Some(CalibrationSource::Scale { mm_per_px: scale?, sigma }),
-    }
-}
-
-/// Standard deviation of the single number \[mm/px\], if the file has one.
-fn read_scale_sigma(table: &Table<'_>, scale: Option<f64>) -> Option<f64> {
-    const KEY: &str = "mm_per_px_sigma";
-    let sigma = table.optional_number(KEY, 0.0..=*SCALE_MM_PER_PX.end())?;
-    if !table.has("mm_per_px") {
-        table.report(KEY, "the standard deviation of no scale", "mm_per_px beside it");
-    }
-    if scale.is_some_and(|scale| sigma >= scale) {
-        table.report(KEY, sigma.to_string(), "less than mm_per_px");
-    }
-    Some(sigma)
-}
-
-fn read_gauge(table: &Table<'_>) -> Option<Gauge> {
-    let roi = read_roi(table);
-    let axis = table.required_choice(
-        "bead_axis",
-        &[("vertical", Axis::Vertical), ("horizontal", Axis::Horizontal)],
-    );
-    let polarity = table.required_choice(
-        "polarity",
-        &[("bright", Polarity::Bright), ("dark", Polarity::Dark), ("any", Polarity::Any)],
-    );
-    let range = table.numbers::<2>("width_range_mm", 1e-6..=1e5);
-    let method =
-        table.choice("method", &[("caliper", Method::Caliper), ("edge_lines", Method::EdgeLines)]);
-    let calipers = table.integer_or("calipers", 4..=4096, 64);
-    let min_contrast_grey = table.number_or("min_contrast_grey", 0.1..=255.0, 6.0);
-    let [min, max] = range?;
-    if min >= max {
-        table.report("width_range_mm", format!("[{min}, {max}]"), "the narrower width first");
-        return None;
-    }
-    Some(Gauge {
-        roi: roi?,
-        axis: axis?,
-        polarity: polarity?,
-        width_range: (Mm::new(min).ok()?, Mm::new(max).ok()?),
-        method: method?,
-        calipers: usize::try_from(calipers?).ok()?,
-        min_contrast_grey: min_contrast_grey?,
-    })
-}
-
-fn read_roi(table: &Table<'_>) -> Option<Roi> {
-    let row = table.numbers::<4>("roi_px", 0.0..=MAX_SIDE_PX)?;
-    if row.iter().any(|value| value.fract() != 0.0) || row[2] < 8.0 || row[3] < 8.0 {
-        table.report(
-            "roi_px",
-            format!("{row:?}"),
-            "x, y, width, height in whole pixels, width and height 8 or more",
-        );
-        return None;
-    }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "whole and within 0..=65536"
-    )]
-    let [x, y, width, height] = row.map(|value| value as usize);
-    Some(Roi { x, y, width, height })
-}
-
-fn read_channel(table: &Table<'_>) -> Option<Channel> {
-    table.choice(
-        "channel",
-        &[
-            ("grey", Channel::Grey),
-            ("red", Channel::Red),
-            ("green", Channel::Green),
-            ("blue", Channel::Blue),
-        ],
-    )
-}
-
-fn read_mount(table: &Table<'_>) -> Option<Mount> {
-    table.required_choice("mount", &[("flange", Mount::Flange), ("fixed", Mount::Fixed)])
-}
-
-fn read_camera(
-    table: &Table<'_>,
-    folder: &Path,
-    mount: Option<Mount>,
-    rate_hz: Option<f64>,
-) -> Option<Camera> {
-    let name = table.text("source");
-    let source = name.and_then(|name| {
-        let source = Source::parse(name, folder);
-        if source.is_none() {
-            table.report("source", format!("\"{name}\""), "camera: and a whole number");
-        }
-        source
-    });
-    let offset = table.number("offset_mm", 0.0..=1e5);
-    let deadline = table.number_or("deadline_s", 0.05..=600.0, 2.0);
-    Some(Camera {
-        source: source?,
-        source_name: name?.to_string(),
-        rate_hz: rate_hz?,
-        mount: mount?,
-        offset: Mm::new(offset?).ok()?,
-        deadline: Span::from_secs(deadline?),
-    })
-}
-
-fn read_robot(table: &Table<'_>, limits: Option<Limits>) -> Option<Robot> {
-    let driver = table.required_choice("driver", &[("line", ())]);
-    let address = table.text("address");
-    let rate_hz = table.number("rate_hz", 0.5..=1000.0);
-    let start_speed = table.number("start_speed_mm_per_s", 0.0..=10_000.0);
-    let start_length = table.number("start_length_mm", 0.0..=1e6);
-    let valid_ms = table.integer_or("valid_ms", 100..=1000, 600);
-    if address.is_some_and(|address| !address.contains(':')) {
-        table.report("address", format!("\"{}\"", address.unwrap_or_default()), "host:port");
-    }
-    if let (Some(rate_hz), Some(valid_ms)) = (rate_hz, valid_ms)
-        && u32::try_from(valid_ms).is_ok_and(|ms| f64::from(ms) < 1.5e3 / rate_hz)
-    {
-        let expected =
-            format!("at least {:.0}, one and a half periods of rate_hz", 1.5e3 / rate_hz);
-        table.report("valid_ms", valid_ms.to_string(), expected);
-    }
-    if let (Some(limits), Some(speed)) = (limits, start_speed)
-        && !(limits.min_speed.get()..=limits.max_speed.get()).contains(&speed)
-    {
-        let expected =
-            format!("a speed within [limits], {} to {}", limits.min_speed, limits.max_speed);
-        table.report("start_speed_mm_per_s", speed.to_string(), expected);
-    }
-    driver?;
-    Some(Robot {
-        address: address?.to_string(),
-        rate_hz: rate_hz?,
-        start_speed: MmPerS::new(start_speed?).ok()?,
-        start_length: Mm::new(start_length?).ok()?,
-        valid_ms: u32::try_from(valid_ms?).ok()?,
     })
 }
 

@@ -4,7 +4,7 @@
 //! plate, which is the robot's side.
 
 use super::{Need, Strategy, Unusable, Wish};
-use crate::extruder::adaptive::{FirstOrder, Law as Adaptive};
+use crate::extruder::adaptive::{AdaptiveLaw, ScalarPlant};
 use crate::extruder::report::ExtruderReport;
 use crate::time::{Span, Stamp};
 use crate::units::{Mm2, Mm3PerS};
@@ -25,7 +25,7 @@ pub struct NozzleModel {
 /// The law with its nozzle. The flow at the nozzle must be reported.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdaptiveNozzle {
-    law: Adaptive,
+    law: AdaptiveLaw,
     nozzle: NozzleModel,
     reference: f64,
     wish: Wish,
@@ -34,7 +34,7 @@ pub struct AdaptiveNozzle {
 
 impl AdaptiveNozzle {
     /// Before its first bead.
-    pub fn new(law: Adaptive, nozzle: NozzleModel) -> Self {
+    pub fn new(law: AdaptiveLaw, nozzle: NozzleModel) -> Self {
         Self { law, nozzle, reference: 0.0, wish: Wish::default(), begun: false }
     }
 
@@ -46,7 +46,7 @@ impl AdaptiveNozzle {
     /// The feed that holds a speed in the nozzle if nothing is unknown
     /// \[kg/s\].
     fn holding(&self, speed: f64) -> f64 {
-        let FirstOrder { state_gain_per_s, input_gain } = self.law.plant();
+        let ScalarPlant { state_gain_per_s, input_gain } = self.law.plant();
         -state_gain_per_s / input_gain * speed - self.nozzle.pressure_kg_per_s
     }
 }
@@ -107,11 +107,11 @@ mod tests {
     use crate::units::Mm2;
 
     fn law() -> AdaptiveNozzle {
-        let plant = FirstOrder { state_gain_per_s: -1.0, input_gain: 1.0 };
+        let plant = ScalarPlant { state_gain_per_s: -1.0, input_gain: 1.0 };
         let adaptation = Adaptation::Constant { learning_rate: 4.0, weight: 1.0 };
         let gains =
             Gains { feedback: 1.604, error_feedback: 0.0, adaptation, safety: Safety::default() };
-        let law = Adaptive::new(plant, gains, Span::from_millis(50)).unwrap();
+        let law = AdaptiveLaw::new(plant, gains, Span::from_millis(50)).unwrap();
         let nozzle = NozzleModel { section: Mm2::constant(100.0), pressure_kg_per_s: 0.0 };
         AdaptiveNozzle::new(law, nozzle)
     }
@@ -128,8 +128,8 @@ mod tests {
     }
 
     /// Runs the law against its plant with a part that it does not know; gives
-    /// the flow at the end.
-    fn after(secs: f64, unknown: f64) -> f64 {
+    /// the law and the flow at the end.
+    fn run(secs: f64, unknown: f64) -> (AdaptiveNozzle, f64) {
         let (mut law, wanted) = (law(), Mm3PerS::constant(1000.0));
         let (mut speed, mut now) = (0.01, Stamp::START);
         let mut command = law.begin(now, wanted).value;
@@ -145,7 +145,21 @@ mod tests {
             now = now + dt;
         }
         assert!(command.is_finite());
-        speed * 100.0 / M_PER_MM
+        (law, speed * 100.0 / M_PER_MM)
+    }
+
+    fn after(secs: f64, unknown: f64) -> f64 {
+        run(secs, unknown).1
+    }
+
+    #[test]
+    fn what_was_learnt_on_one_bead_holds_at_the_beginning_of_the_next() {
+        let wanted = Mm3PerS::constant(1000.0);
+        let first = law().begin(Stamp::START, wanted).value;
+        assert!((first - 0.010).abs() < 1e-9, "{first}");
+        let (mut law, _) = run(40.0, -0.004);
+        let next = law.begin(Stamp::from_secs(60.0), wanted).value;
+        assert!((next - 0.014).abs() < 2e-5, "{next}");
     }
 
     #[test]
