@@ -1,5 +1,6 @@
 use super::*;
 use crate::extruder::law::{Constant, Played};
+use crate::extruder::{ExtruderFault, ExtruderHold, PumpMode};
 use crate::identify::profile::{Point, Profile};
 use crate::units::Rpm;
 

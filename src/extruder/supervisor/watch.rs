@@ -1,0 +1,132 @@
+//! What reports mean for the state: starts, holds, faults, and going on.
+
+use super::{Phase, Supervisor};
+use crate::control::follow::Verdict;
+use crate::extruder::Drive;
+use crate::extruder::law::Need;
+use crate::extruder::report::{ExtruderReport, PumpMode};
+use crate::extruder::state::{ExtruderFault, ExtruderHold};
+use crate::time::Stamp;
+
+impl Supervisor {
+    /// The extruder reported.
+    pub fn reported(&mut self, now: Stamp, report: &ExtruderReport) {
+        self.link_up = true;
+        self.report = Some((now, *report));
+        let too_high = self.setup.max_pressure.zip(report.pressure_mpa);
+        let too_high = too_high.is_some_and(|(limit, found)| found > limit);
+        self.relieving &= too_high;
+        if self.phase == Phase::Off || matches!(self.phase, Phase::Fault(_)) {
+            return;
+        }
+        if too_high {
+            self.relieving = true;
+            self.phase = Phase::Fault(ExtruderFault::Overpressure);
+            return;
+        }
+        match report.pump {
+            PumpMode::Fault => self.phase = Phase::Fault(ExtruderFault::Pump),
+            PumpMode::On => self.runs(now, report),
+            PumpMode::Starting => self.starts_anew(now),
+            // A report may still tell of the time before the pump was told to run.
+            PumpMode::Off | PumpMode::Stopping if now - self.begun <= self.setup.max_gap => {
+                self.starts_anew(self.begun);
+            }
+            PumpMode::Off | PumpMode::Stopping => {
+                if !matches!(self.phase, Phase::Starting { .. }) {
+                    self.phase = Phase::Fault(ExtruderFault::Pump);
+                }
+            }
+        }
+    }
+
+    /// The pump says that it is starting: a law that runs would wind up against
+    /// a flow that does not come.
+    fn starts_anew(&mut self, since: Stamp) {
+        if matches!(self.phase, Phase::Running | Phase::Holding { .. }) {
+            self.phase = Phase::Starting { since };
+        }
+    }
+
+    /// The pump runs: a start is over, or the screw turns as it was told.
+    fn runs(&mut self, now: Stamp, report: &ExtruderReport) {
+        if !report.valve_open {
+            self.hold(now, ExtruderHold::ValveShut);
+            return;
+        }
+        if matches!(self.phase, Phase::Starting { .. }) {
+            self.phase = Phase::Running;
+            self.controlled = None;
+            self.setup.law.strategy_mut().settle(now, self.applied);
+        }
+        self.resume_from(now, ExtruderHold::ValveShut);
+        if self.setup.drive == Drive::Rpm
+            && let Some(turning) = report.screw_rpm
+        {
+            match self.follow.observe_share(now, turning.get(), self.applied) {
+                Verdict::Lost => self.phase = Phase::Fault(ExtruderFault::SpeedMismatch),
+                Verdict::Mismatch => self.hold(now, ExtruderHold::SpeedMismatch),
+                _ => self.resume_from(now, ExtruderHold::SpeedMismatch),
+            }
+        }
+        self.resume_from(now, ExtruderHold::LinkDown);
+        if self.has_what_is_needed(report) {
+            self.resume_from(now, ExtruderHold::NoReading);
+            self.hear(now, report);
+        }
+    }
+
+    /// Lets the law hear a report; one that cannot be true is a hold until one
+    /// comes that can.
+    fn hear(&mut self, now: Stamp, report: &ExtruderReport) {
+        self.usable = self.setup.law.strategy_mut().hear(now, report).is_ok();
+        if !self.usable {
+            self.hold(now, ExtruderHold::BadReading);
+        }
+    }
+
+    /// A limit on the pressure is no limit where the pressure is not reported.
+    fn has_what_is_needed(&self, report: &ExtruderReport) -> bool {
+        self.setup.law.strategy().needs().iter().all(|need| need.met_by(report))
+            && (self.setup.max_pressure.is_none() || Need::Pressure.met_by(report))
+    }
+
+    /// Holds when reports stay out, and gives up when a hold or a start lasts
+    /// too long.
+    pub(super) fn lose_patience(&mut self, now: Stamp) {
+        let heard = self.report.is_some_and(|(at, report)| {
+            now - at <= self.setup.max_gap && self.has_what_is_needed(&report)
+        });
+        match self.phase {
+            Phase::Running if !heard => self.hold(now, ExtruderHold::NoReading),
+            Phase::Starting { since } if now - since > self.setup.max_hold => {
+                self.phase = Phase::Fault(ExtruderFault::DidNotStart);
+            }
+            Phase::Holding { since, why } if now - since > self.setup.max_hold => {
+                self.phase = Phase::Fault(ExtruderFault::HeldTooLong(why));
+            }
+            _ => {}
+        }
+    }
+
+    /// Keeps the last command; a first reason stays.
+    pub(super) fn hold(&mut self, now: Stamp, why: ExtruderHold) {
+        if self.phase == Phase::Running {
+            self.phase = Phase::Holding { since: now, why };
+        }
+    }
+
+    fn resume_from(&mut self, now: Stamp, reason: ExtruderHold) {
+        if matches!(self.phase, Phase::Holding { why, .. } if why == reason) {
+            self.resume(now);
+        }
+    }
+
+    /// The reason for a hold has gone. The law goes on from the command that
+    /// was kept, and gathers nothing of the time between.
+    pub(super) fn resume(&mut self, now: Stamp) {
+        self.phase = Phase::Running;
+        self.controlled = None;
+        self.setup.law.strategy_mut().resume(now, self.applied);
+    }
+}
