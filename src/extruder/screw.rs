@@ -8,6 +8,7 @@
 //! of it together.
 
 pub mod control;
+pub mod design;
 pub mod error;
 pub mod euler;
 pub mod exact;
@@ -17,6 +18,7 @@ pub mod law;
 pub mod model;
 
 pub use control::{ScrewControl, ScrewFault, ScrewStep};
+pub use design::{ScrewDesign, TurnUnit};
 pub use error::ScrewError;
 pub use law::{FillLaw, PiecewiseExponential, Saturated};
-pub use model::{Conveying, Pulsation, Screw, ScrewDesign, TurnUnit};
+pub use model::{Conveying, Pulsation, Screw};

@@ -2,76 +2,7 @@
 //! to (17). Behind the nozzle the channel is full over the length x; from there
 //! to the feed at L it is filled to a share U that was fed a while ago.
 
-use std::f64::consts::TAU;
-
 use super::error::{ScrewError, positive};
-use crate::units::{Mm, Rpm};
-
-const MM_PER_M: f64 = 1000.0;
-
-/// What the screw's speed is multiplied with the pitch in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TurnUnit {
-    /// Radians a second; with it the paper's two cases are feasible.
-    RadPerS,
-    /// Turns a second, which is how far a screw thread conveys without slip.
-    RevPerS,
-}
-
-/// A screw as it is drawn, and what it conveys.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ScrewDesign {
-    /// From the nozzle to the feed, L.
-    pub length: Mm,
-    /// The screw's pitch ξ.
-    pub pitch: Mm,
-    /// The screw's constant speed N0.
-    pub speed: Rpm,
-    /// How speed and pitch make the conveying speed.
-    pub unit: TurnUnit,
-    /// Conductance of the nozzle, `K_d` \[m³\].
-    pub nozzle_m3: f64,
-    /// Coefficient of the pressure flow in the channel, B \[m⁴\].
-    pub channel_m4: f64,
-    /// Density of the melt ρ0 \[kg/m³\].
-    pub density_kg_per_m3: f64,
-}
-
-impl ScrewDesign {
-    /// The screw of the paper's table.
-    pub const DIAGNE_2015: Self = Self {
-        length: Mm::constant(200.0),
-        pitch: Mm::constant(10.0),
-        speed: Rpm::constant(90.0),
-        unit: TurnUnit::RadPerS,
-        nozzle_m3: 2.45e-5,
-        channel_m4: 9.345e-9,
-        density_kg_per_m3: 1240.0,
-    };
-
-    /// B of a channel of a width and a depth \[m⁴\]: W·H³/12, eq. (101).
-    pub fn channel_m4(width: Mm, depth: Mm) -> f64 {
-        width.get() * depth.get().powi(3) / 12.0 / MM_PER_M.powi(4)
-    }
-
-    /// θ1 and θ2 of the design, eqs. (14) and (15), with the conveying speed
-    /// as it pulsates.
-    pub fn screw(&self, pulsation: Pulsation) -> Result<Screw, ScrewError> {
-        let turns = match self.unit {
-            TurnUnit::RadPerS => self.speed.get() * TAU / 60.0,
-            TurnUnit::RevPerS => self.speed.get() / 60.0,
-        };
-        let channel = positive("channel_m4", self.channel_m4)?;
-        let density = positive("density_kg_per_m3", self.density_kg_per_m3)?;
-        Screw::new(Screw {
-            theta1_m_per_s: self.pitch.get() / MM_PER_M * turns,
-            theta2_per_m: positive("nozzle_m3", self.nozzle_m3)? / (channel * density),
-            length_m: self.length.get() / MM_PER_M,
-            pulsation,
-            conveying: Conveying::AtPresentSpeed,
-        })
-    }
-}
 
 /// How the conveying speed pulsates about its mean: c = θ1·(1 + ε·cos(ωt + φ)),
 /// eq. (17).
@@ -245,6 +176,8 @@ impl Screw {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::extruder::screw::{ScrewDesign, TurnUnit};
+    use crate::units::{Mm, Rpm};
 
     const B: Pulsation = Pulsation { share: 0.4, rad_per_s: 0.4, phase_rad: 0.0 };
 
