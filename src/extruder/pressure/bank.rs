@@ -5,7 +5,7 @@
 
 use super::Fopdt;
 use super::belief::{Belief, Filter, GAIN, LAG, LOAD, State};
-use super::history::{History, Lags};
+use super::history::{CommandHistory, Lags};
 use super::jump::Watch;
 use super::tuning::Tuning;
 
@@ -87,7 +87,7 @@ impl Bank {
     }
 
     /// Takes a reading \[MPa\], `dt_s` after the last.
-    pub fn read(&mut self, history: &History, at_s: f64, dt_s: f64, reading: f64) {
+    pub fn read(&mut self, history: &CommandHistory, at_s: f64, dt_s: f64, reading: f64) {
         let filter = self.filter;
         let moving = MOVING * filter.tuning.sigma();
         let mut seen = self.beliefs.map(|belief| (belief.weight, None));

@@ -1,6 +1,7 @@
 //! What every law of the pressure loop keeps of its calls: the times of
 //! readings and commands, and the command in force.
 
+use super::kalman::Kalman;
 use super::{Command, Refused};
 use crate::extruder::limits::{CommandLimit, CommandLimits};
 use crate::time::{Span, Stamp};
@@ -50,6 +51,13 @@ impl Calls {
         }
         self.read = Some(now);
         Ok(since)
+    }
+
+    /// Takes a reading into a filter.
+    pub fn hear(&mut self, now: Stamp, pressure: MPa, kalman: &mut Kalman) -> Result<(), Refused> {
+        self.read(now, pressure)?;
+        kalman.step(pressure);
+        Ok(())
     }
 
     /// The time since the last command \[s\]: 0 at the first call, none where

@@ -46,7 +46,7 @@ pub struct Moment {
 
 /// The commands of the last while.
 #[derive(Debug, Clone, PartialEq)]
-pub struct History {
+pub struct CommandHistory {
     gain: f64,
     lag_s: f64,
     /// A ring; the newest is at `newest`.
@@ -54,7 +54,7 @@ pub struct History {
     newest: usize,
 }
 
-impl History {
+impl CommandHistory {
     /// As if `speed_rpm` had been commanded for ever. Keeps what is needed to
     /// look back by `back_s`.
     #[expect(
@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn a_step_is_the_closed_form_at_any_moment() {
-        let mut history = History::new(&model(), 1.0, 0.0);
+        let mut history = CommandHistory::new(&model(), 1.0, 0.0);
         history.push(1.0, 0.3);
         for dt in [0.0, 0.001, 0.41, 0.4137, 2.0] {
             let x = dt / 0.84;
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn many_short_commands_are_the_sum_of_their_steps() {
-        let mut history = History::new(&model(), 2.0, 0.5);
+        let mut history = CommandHistory::new(&model(), 2.0, 0.5);
         let commands: Vec<(f64, f64)> =
             (0..150).map(|i| (f64::from(i) * 0.013, f64::from(i * 7 % 11) * 0.1)).collect();
         for (at, speed) in &commands {
@@ -153,8 +153,8 @@ mod tests {
 
     #[test]
     fn a_ring_that_went_round_still_knows_its_span() {
-        let mut history = History::new(&model(), 0.5, 0.0);
-        let mut all = History::new(&model(), 100.0, 0.0);
+        let mut history = CommandHistory::new(&model(), 0.5, 0.0);
+        let mut all = CommandHistory::new(&model(), 100.0, 0.0);
         for i in 0..5000 {
             let (at, speed) = (f64::from(i) * 0.005, f64::from(i % 13));
             history.push(at, speed);
@@ -168,7 +168,7 @@ mod tests {
 
     #[test]
     fn a_second_command_at_the_same_moment_replaces_the_first() {
-        let mut history = History::new(&model(), 1.0, 0.0);
+        let mut history = CommandHistory::new(&model(), 1.0, 0.0);
         history.push(1.0, 5.0);
         history.push(1.0, 0.3);
         history.push(0.5, 9.0);

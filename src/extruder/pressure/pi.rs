@@ -31,33 +31,43 @@ impl PiGains {
         within("the tracking time [s]", tracking_s, 1e-3..=1e6, wanted)?;
         Ok(Self { kp, ki: kp / integral_s, tracking_s })
     }
+}
 
-    /// Speed for each MPa of error \[rpm/MPa\].
-    pub const fn kp(&self) -> f64 {
-        self.kp
+/// What a proportional-integral law remembers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PiMemory {
+    gains: PiGains,
+    integral: f64,
+    /// The last error \[MPa\] and what the law would have liked for it \[rpm\].
+    error: f64,
+    demand: f64,
+}
+
+impl PiMemory {
+    /// With an integral \[rpm\], where a speed runs.
+    pub const fn new(gains: PiGains, integral: f64, running: Rpm) -> Self {
+        Self { gains, integral, error: 0.0, demand: running.get() }
     }
 
-    /// Speed gathered each second for each MPa of error \[rpm/(MPa·s)\].
-    pub const fn ki(&self) -> f64 {
-        self.ki
-    }
-
-    /// Time in which what a limit took is forgotten \[s\].
-    pub const fn tracking_s(&self) -> f64 {
-        self.tracking_s
+    /// What the law would like \[rpm\] for an error \[MPa\], `dt_s` after the
+    /// last one, of which `applied` became of the demand; beside a part that is
+    /// known beforehand \[rpm\].
+    pub fn step(&mut self, error: f64, feedforward: f64, applied: Rpm, dt_s: f64) -> f64 {
+        let lost = applied.get() - self.demand;
+        let gathers = self.gains.ki * self.error + lost / self.gains.tracking_s;
+        self.integral = sane(self.integral + gathers * dt_s);
+        self.error = error;
+        self.demand = sane(feedforward + self.gains.kp * error + self.integral);
+        self.demand
     }
 }
 
 /// The law with its memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pi {
-    gains: PiGains,
     limits: CommandLimits,
     kalman: Kalman,
-    integral: f64,
-    /// The last error \[MPa\] and what the law would have liked for it \[rpm\].
-    error: f64,
-    demand: f64,
+    memory: PiMemory,
     calls: Calls,
 }
 
@@ -65,13 +75,11 @@ impl Pi {
     /// Takes over from what runs, without a bump.
     pub fn new(gains: PiGains, noise: Noise, limits: CommandLimits, running: Running) -> Self {
         let error = running.target.get() - running.pressure.get();
+        let integral = running.speed.get() - gains.kp * error;
         Self {
-            gains,
             limits,
             kalman: Kalman::new(noise, running.pressure),
-            integral: running.speed.get() - gains.kp * error,
-            error: 0.0,
-            demand: running.speed.get(),
+            memory: PiMemory::new(gains, integral, running.speed),
             calls: Calls::new(running.speed),
         }
     }
@@ -79,19 +87,14 @@ impl Pi {
 
 impl PressureLaw for Pi {
     fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), Refused> {
-        self.calls.read(now, pressure)?;
-        self.kalman.step(pressure);
-        Ok(())
+        self.calls.hear(now, pressure, &mut self.kalman)
     }
 
     fn step(&mut self, now: Stamp, target: MPa) -> Command {
         let Some(dt_s) = self.calls.begin(now) else { return self.calls.last() };
-        let lost = self.calls.last().speed.get() - self.demand;
-        let gathers = self.gains.ki * self.error + lost / self.gains.tracking_s;
-        self.integral = sane(self.integral + gathers * dt_s);
-        self.error = target.get() - self.kalman.pressure();
-        self.demand = sane(self.gains.kp * self.error + self.integral);
-        self.calls.command(&self.limits, self.demand, dt_s)
+        let error = target.get() - self.kalman.pressure();
+        let demand = self.memory.step(error, 0.0, self.calls.last().speed, dt_s);
+        self.calls.command(&self.limits, demand, dt_s)
     }
 
     fn settle(&mut self, _now: Stamp, applied: Rpm) {

@@ -9,7 +9,7 @@
 
 use super::bank::{Bank, Foretold};
 use super::calls::{Calls, Running};
-use super::history::History;
+use super::history::CommandHistory;
 use super::reference::{Reference, Way};
 use super::tuning::Tuning;
 use super::{Command, Fopdt, PressureLaw, Refused};
@@ -23,7 +23,7 @@ pub struct Predictive {
     model: Fopdt,
     tuning: Tuning,
     limits: CommandLimits,
-    history: History,
+    history: CommandHistory,
     bank: Bank,
     reference: Reference,
     calls: Calls,
@@ -41,7 +41,7 @@ impl Predictive {
             model,
             tuning,
             limits,
-            history: History::new(&model, Bank::back_s(&model, &tuning), speed),
+            history: CommandHistory::new(&model, Bank::back_s(&model, &tuning), speed),
             bank: Bank::new(&model, tuning, load),
             reference: Reference::new(tuning.reference_s, model.lag_s(), running),
             calls: Calls::new(running.speed),

@@ -2,10 +2,10 @@
 //! foretells: the pressure that is read, less what the commands under way have
 //! not yet done to it. Ma et al. 2026, eq. (8).
 
-use super::calls::{Calls, Running, sane};
-use super::history::History;
+use super::calls::{Calls, Running};
+use super::history::CommandHistory;
 use super::kalman::{Kalman, Noise};
-use super::pi::PiGains;
+use super::pi::{PiGains, PiMemory};
 use super::reference::Reference;
 use super::{Command, Fopdt, PressureLaw, Refused};
 use crate::extruder::limits::CommandLimits;
@@ -15,7 +15,7 @@ use crate::units::{MPa, Rpm};
 /// What the commands under way are about to do, from the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Smith {
-    history: History,
+    history: CommandHistory,
     dead_time_s: f64,
 }
 
@@ -23,7 +23,7 @@ impl Smith {
     /// As if the speed had been commanded for ever.
     pub fn new(model: &Fopdt, speed_rpm: f64) -> Self {
         let dead_time_s = model.dead_time_s();
-        Self { history: History::new(model, dead_time_s, speed_rpm), dead_time_s }
+        Self { history: CommandHistory::new(model, dead_time_s, speed_rpm), dead_time_s }
     }
 
     /// By how much the pressure will have changed a dead time from now
@@ -46,14 +46,11 @@ impl Smith {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SmithPi {
     model: Fopdt,
-    gains: PiGains,
     limits: CommandLimits,
     kalman: Kalman,
     smith: Smith,
     reference: Reference,
-    integral: f64,
-    error: f64,
-    demand: f64,
+    memory: PiMemory,
     calls: Calls,
 }
 
@@ -71,14 +68,11 @@ impl SmithPi {
         let steady = running.pressure.get() / model.gain();
         Self {
             model,
-            gains,
             limits,
             kalman: Kalman::new(noise, running.pressure),
             smith: Smith::new(&model, running.speed.get()),
             reference: Reference::new(reference_s, model.lag_s(), running),
-            integral: running.speed.get() - steady,
-            error: 0.0,
-            demand: running.speed.get(),
+            memory: PiMemory::new(gains, running.speed.get() - steady, running.speed),
             calls: Calls::new(running.speed),
         }
     }
@@ -86,21 +80,16 @@ impl SmithPi {
 
 impl PressureLaw for SmithPi {
     fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), Refused> {
-        self.calls.read(now, pressure)?;
-        self.kalman.step(pressure);
-        Ok(())
+        self.calls.hear(now, pressure, &mut self.kalman)
     }
 
     fn step(&mut self, now: Stamp, target: MPa) -> Command {
         let Some(dt_s) = self.calls.begin(now) else { return self.calls.last() };
-        let lost = self.calls.last().speed.get() - self.demand;
-        let gathers = self.gains.ki() * self.error + lost / self.gains.tracking_s();
-        self.integral = sane(self.integral + gathers * dt_s);
         let way = self.reference.step(target.get(), dt_s);
-        self.error = way.from - (self.kalman.pressure() + self.smith.under_way(now));
+        let error = way.from - (self.kalman.pressure() + self.smith.under_way(now));
         let feedforward = way.drive(self.model.lag_s()) / self.model.gain();
-        self.demand = sane(feedforward + self.gains.kp() * self.error + self.integral);
-        let command = self.calls.command(&self.limits, self.demand, dt_s);
+        let demand = self.memory.step(error, feedforward, self.calls.last().speed, dt_s);
+        let command = self.calls.command(&self.limits, demand, dt_s);
         self.smith.commanded(now, command.speed);
         command
     }

@@ -112,9 +112,7 @@ impl Vsfc {
 
 impl PressureLaw for Vsfc {
     fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), Refused> {
-        self.calls.read(now, pressure)?;
-        self.kalman.step(pressure);
-        Ok(())
+        self.calls.hear(now, pressure, &mut self.kalman)
     }
 
     fn step(&mut self, now: Stamp, target: MPa) -> Command {
