@@ -21,8 +21,8 @@ mod law;
 #[cfg(test)]
 mod tests;
 
-pub use gains::{Adaptation, FirstOrder, GainError, Gains, Safety};
-pub use law::{Action, Law, RampErrors};
+pub use gains::{Adaptation, GainError, Gains, Safety, ScalarPlant};
+pub use law::{Action, AdaptiveLaw, RampErrors};
 
 use crate::time::Span;
 
@@ -34,13 +34,13 @@ pub struct StrandModel {
     /// second.
     pub pressure_gain: f64,
     /// β2 and β3.
-    pub nozzle: FirstOrder,
+    pub nozzle: ScalarPlant,
     /// β4: speed behind the nozzle over that in it (bending and swelling).
     pub swell: f64,
     /// β5: how the strand is driven by what comes from the nozzle \[1/s\].
     pub push_per_s: f64,
     /// β6 and β7.
-    pub strand: FirstOrder,
+    pub strand: ScalarPlant,
 }
 
 /// What is measured.
@@ -87,8 +87,8 @@ pub struct SubSystemError {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Adaptive {
     model: StrandModel,
-    nozzle: Law,
-    strand: Law,
+    nozzle: AdaptiveLaw,
+    strand: AdaptiveLaw,
 }
 
 impl Adaptive {
@@ -100,7 +100,7 @@ impl Adaptive {
         hold: Span,
     ) -> Result<Self, SubSystemError> {
         let of = |part, plant, gains| {
-            Law::new(plant, gains, hold).map_err(|why| SubSystemError { part, why })
+            AdaptiveLaw::new(plant, gains, hold).map_err(|why| SubSystemError { part, why })
         };
         let coupling = [model.pressure_gain, model.swell, model.push_per_s];
         if let Some(value) = coupling.into_iter().find(|value| !value.is_finite()) {
@@ -146,12 +146,12 @@ impl Adaptive {
     }
 
     /// The law of the nozzle.
-    pub fn nozzle(&self) -> &Law {
+    pub fn nozzle(&self) -> &AdaptiveLaw {
         &self.nozzle
     }
 
     /// The law of the strand.
-    pub fn strand(&self) -> &Law {
+    pub fn strand(&self) -> &AdaptiveLaw {
         &self.strand
     }
 

@@ -8,7 +8,7 @@
 use super::hash::{mix, normal_pair};
 use super::strand::{Disturbance, Parameters, Strand};
 use crate::extruder::adaptive::{
-    Action, Adaptation, Adaptive, FirstOrder, Gains, Inputs, Reading, Safety, StrandModel,
+    Action, Adaptation, Adaptive, Gains, Inputs, Reading, Safety, ScalarPlant, StrandModel,
     SubSystemError, Targets,
 };
 use crate::time::Span;
@@ -16,10 +16,10 @@ use crate::time::Span;
 /// The plant. β2, β3 are fitted, with [`FEEDBACK`] and [`LEARNING_RATE`].
 pub const MODEL: StrandModel = StrandModel {
     pressure_gain: 0.01,
-    nozzle: FirstOrder { state_gain_per_s: -1.0, input_gain: 1.0 },
+    nozzle: ScalarPlant { state_gain_per_s: -1.0, input_gain: 1.0 },
     swell: 1.2,
     push_per_s: 0.6,
-    strand: FirstOrder { state_gain_per_s: -1.2, input_gain: 0.6 },
+    strand: ScalarPlant { state_gain_per_s: -1.2, input_gain: 0.6 },
 };
 /// k1 (fitted) and k3.
 pub const FEEDBACK: [f64; 2] = [1.604, 2.0];
@@ -57,7 +57,7 @@ pub enum Method {
 impl Method {
     /// Its gains for either sub-system.
     pub fn gains(self) -> [Gains; 2] {
-        let of = |part: usize, plant: FirstOrder| {
+        let of = |part: usize, plant: ScalarPlant| {
             let feedback = FEEDBACK[part];
             let adaptation = match self {
                 Self::NotAdaptive => Adaptation::Off,

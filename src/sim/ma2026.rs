@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use super::pressure::{Disturbed, Drift, Load, Plant};
+use super::pressure::{Disturbed, Drift, Load, SimPressure};
 use crate::extruder::CommandLimits;
 use crate::extruder::pressure::kalman::Noise;
 use crate::extruder::pressure::pi::{Pi, PiGains};
@@ -258,7 +258,7 @@ impl Experiment {
         let mut law = tried.law(running)?;
         let process = self.factors.process()?;
         let fastest = Rpm::constant(3.0);
-        let mut plant = Plant::new(process, self.disturbed.clone(), fastest, running);
+        let mut plant = SimPressure::new(process, self.disturbed.clone(), fastest, running);
         let mut course = Course::default();
         let mut tick = 0;
         while plant.now_s() <= self.takes_s {
@@ -274,7 +274,7 @@ impl Experiment {
         Ok(course)
     }
 
-    fn act(&self, tick: u64, law: &mut dyn PressureLaw, plant: &mut Plant, previewed: bool) {
+    fn act(&self, tick: u64, law: &mut dyn PressureLaw, plant: &mut SimPressure, previewed: bool) {
         let now = Stamp::from_secs(plant.now_s());
         if tick.is_multiple_of(READ_EVERY) {
             // Simulated readings are never late and always plausible.

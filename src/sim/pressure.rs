@@ -45,7 +45,7 @@ pub struct Disturbed {
 
 /// The plant with its state.
 #[derive(Debug, Clone)]
-pub struct Plant {
+pub struct SimPressure {
     process: Fopdt,
     disturbed: Disturbed,
     fastest_rpm: f64,
@@ -59,7 +59,7 @@ pub struct Plant {
     tick: u64,
 }
 
-impl Plant {
+impl SimPressure {
     /// As it has run for ever.
     #[expect(
         clippy::cast_possible_truncation,
@@ -154,7 +154,7 @@ mod tests {
         for dead in [0.41, 0.4137, 0.0, 0.492] {
             let process = Fopdt::new(2.0, 0.84, dead).unwrap();
             let fastest = Rpm::constant(3.0);
-            let mut plant = Plant::new(process, Disturbed::default(), fastest, still());
+            let mut plant = SimPressure::new(process, Disturbed::default(), fastest, still());
             plant.command(Rpm::constant(0.3));
             for _ in 0..400 {
                 plant.advance();
@@ -169,7 +169,7 @@ mod tests {
     fn the_screw_keeps_what_it_can_turn() {
         let process = Fopdt::new(1.0, 0.1, 0.0).unwrap();
         let fastest = Rpm::constant(3.0);
-        let mut plant = Plant::new(process, Disturbed::default(), fastest, still());
+        let mut plant = SimPressure::new(process, Disturbed::default(), fastest, still());
         plant.command(Rpm::constant(50.0));
         for _ in 0..2000 {
             plant.advance();
@@ -187,7 +187,7 @@ mod tests {
         };
         let running =
             Running { pressure: MPa::constant(0.6), target: MPa::ZERO, speed: Rpm::constant(0.6) };
-        let mut plant = Plant::new(process, disturbed, Rpm::constant(3.0), running);
+        let mut plant = SimPressure::new(process, disturbed, Rpm::constant(3.0), running);
         for _ in 0..200 {
             plant.advance();
         }

@@ -1,7 +1,7 @@
 //! A screw that fills and empties: the plant of Diagne et al. 2015, eqs. (13),
 //! (16) and (17), with all that is on its way from the feed to the plug.
 
-use crate::extruder::screw::history::History;
+use crate::extruder::screw::history::FeedHistory;
 use crate::extruder::screw::{Conveying, Screw};
 
 /// How the plant is integrated.
@@ -17,16 +17,16 @@ pub enum Integrator {
 
 /// The plant.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ScrewPlant {
+pub struct SimScrew {
     screw: Screw,
     integrator: Integrator,
     step_s: f64,
     ticks: u32,
     plug_m: f64,
-    feed: History,
+    feed: FeedHistory,
 }
 
-impl ScrewPlant {
+impl SimScrew {
     /// A plant that has been fed `before` until now, with feed and plug on a
     /// grid of `step_s`.
     pub fn new(
@@ -38,7 +38,7 @@ impl ScrewPlant {
     ) -> Self {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
         let room = (screw.longest_delay() / step_s).ceil() as usize + 4;
-        let feed = History::new(room, before);
+        let feed = FeedHistory::new(room, before);
         Self { screw, integrator, step_s, ticks: 0, plug_m, feed }
     }
 
@@ -193,7 +193,7 @@ mod tests {
     fn a_plug_that_is_held_stays() {
         for integrator in [Integrator::Euler, Integrator::RungeKutta(1e-3)] {
             let screw = screw(A);
-            let mut plant = ScrewPlant::new(screw, integrator, 1e-3, 0.13, screw.holding(0.13));
+            let mut plant = SimScrew::new(screw, integrator, 1e-3, 0.13, screw.holding(0.13));
             for _ in 0..5_000 {
                 plant.advance(screw.holding(0.13));
             }
@@ -205,7 +205,7 @@ mod tests {
     fn nothing_happens_before_the_first_effect() {
         for integrator in [Integrator::Euler, Integrator::RungeKutta(1e-3)] {
             let screw = screw(B);
-            let mut plant = ScrewPlant::new(screw, integrator, 1e-3, 0.1, screw.holding(0.1));
+            let mut plant = SimScrew::new(screw, integrator, 1e-3, 0.1, screw.holding(0.1));
             while (plant.plug_m() - 0.1).abs() < 1e-9 {
                 plant.advance(0.9);
             }
@@ -220,7 +220,7 @@ mod tests {
         // q for the way conveyed, d(plug + ∫fill ahead of it) = U − θ2·x/(1 + θ2·x) a metre.
         let screw = Screw { conveying: Conveying::AtSpeedOnTheWay, ..screw(A) };
         let before = screw.holding(0.1);
-        let mut plant = ScrewPlant::new(screw, Integrator::RungeKutta(2e-4), 1e-3, 0.1, before);
+        let mut plant = SimScrew::new(screw, Integrator::RungeKutta(2e-4), 1e-3, 0.1, before);
         let (mut stored, mut passed) = (0.1 + 0.1 * before, 0.0);
         for tick in 0..3_000 {
             let way = screw.way(plant.now_s() + 1e-3) - screw.way(plant.now_s());
@@ -245,9 +245,8 @@ mod tests {
             for pulsation in [Pulsation::default(), A, B] {
                 let screw = Screw { conveying, ..screw(pulsation) };
                 let predictor = Exact::new(screw);
-                let mut plant =
-                    ScrewPlant::new(screw, Integrator::RungeKutta(2e-4), 1e-3, 0.1, 0.2);
-                let mut history = History::new(4_000, 0.2);
+                let mut plant = SimScrew::new(screw, Integrator::RungeKutta(2e-4), 1e-3, 0.1, 0.2);
+                let mut history = FeedHistory::new(4_000, 0.2);
                 let mut due = Vec::new();
                 for tick in 0..4_000 {
                     let now = plant.now_s();

@@ -3,7 +3,7 @@
 
 use super::About;
 use crate::document::Table;
-use crate::extruder::adaptive::{Adaptation, FirstOrder, Gains, Law, Safety};
+use crate::extruder::adaptive::{Adaptation, AdaptiveLaw, Gains, Safety, ScalarPlant};
 use crate::extruder::law::NozzleModel;
 use crate::time::Span;
 use crate::units::Mm2;
@@ -11,7 +11,7 @@ use crate::units::Mm2;
 const ANY: std::ops::RangeInclusive<f64> = -1e9..=1e9;
 
 /// The law and its nozzle. The law's own conditions are checked here.
-pub(super) fn read(table: &Table<'_>, about: &About<'_>) -> Option<(Law, NozzleModel)> {
+pub(super) fn read(table: &Table<'_>, about: &About<'_>) -> Option<(AdaptiveLaw, NozzleModel)> {
     let state = table.number("state_gain_per_s", ANY);
     let input = table.number("input_gain", ANY);
     let feedback = table.number("feedback", ANY);
@@ -35,9 +35,9 @@ pub(super) fn read(table: &Table<'_>, about: &About<'_>) -> Option<(Law, NozzleM
         adaptation,
         safety: Safety { bound, leakage_per_s: leakage? },
     };
-    let plant = FirstOrder { state_gain_per_s: state?, input_gain: input? };
+    let plant = ScalarPlant { state_gain_per_s: state?, input_gain: input? };
     let hold = Span::from_secs(1.0 / about.rates.control_hz);
-    match Law::new(plant, gains, hold) {
+    match AdaptiveLaw::new(plant, gains, hold) {
         Ok(law) => {
             let section = Mm2::new(section?).ok()?;
             Some((law, NozzleModel { section, pressure_kg_per_s: pressure? }))

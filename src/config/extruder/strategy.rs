@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::{ANY, About, adaptive, keys, pressure, screw};
 use crate::document::Table;
 use crate::extruder::Drive;
-use crate::extruder::adaptive::Law as AdaptiveLaw;
+use crate::extruder::adaptive::AdaptiveLaw;
 use crate::extruder::feedforward::RightZeros;
 use crate::extruder::law::{ForetoldFrom, NozzleModel, PressureSettings};
 use crate::extruder::screw::control::ScrewSettings;

@@ -1,6 +1,6 @@
 //! The estimate of the unknown part, from one sample to the next.
 
-use super::gains::{Adaptation, FirstOrder, Gains, mean_exp};
+use super::gains::{Adaptation, Gains, ScalarPlant, mean_exp};
 
 /// Δ̂ and its slope. Over a sample the error is taken for straight, and what
 /// acts on the plant is Δ̂ in the middle of the time for which it is held; so
@@ -16,7 +16,7 @@ pub(super) struct Estimate {
 
 impl Estimate {
     /// Learns from an error, `dt_s` after the last one.
-    pub(super) fn learn(&mut self, plant: FirstOrder, gains: &Gains, error: f64, dt_s: f64) {
+    pub(super) fn learn(&mut self, plant: ScalarPlant, gains: &Gains, error: f64, dt_s: f64) {
         let mean = f64::midpoint(error, self.last_error.unwrap_or(error));
         self.last_error = Some(error);
         if gains.adaptation == Adaptation::Off {
@@ -36,7 +36,7 @@ impl Estimate {
     }
 
     /// What is taken off the command that is held for `hold_s` from now.
-    pub(super) fn acting(&self, plant: FirstOrder, gains: &Gains, error: f64, hold_s: f64) -> f64 {
+    pub(super) fn acting(&self, plant: ScalarPlant, gains: &Gains, error: f64, hold_s: f64) -> f64 {
         if gains.adaptation == Adaptation::Off {
             return self.value;
         }

@@ -6,7 +6,7 @@ use crate::time::Span;
 /// with the output y, the input u, the known part w and the unknown part Δ,
 /// both in the unit of the input.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FirstOrder {
+pub struct ScalarPlant {
     /// a: β2 of the nozzle, β6 of the strand \[1/s\].
     pub state_gain_per_s: f64,
     /// b: β3 of the nozzle, β7 of the strand \[unit of y per second and unit
@@ -36,7 +36,7 @@ impl Gains {
     /// The reference is answered as with the feedback alone. Fast poles are
     /// paid for with noise: the command carries that of the measured output
     /// times feedback and error feedback.
-    pub fn triple_pole(plant: FirstOrder, feedback: f64, pole_per_s: f64) -> Self {
+    pub fn triple_pole(plant: ScalarPlant, feedback: f64, pole_per_s: f64) -> Self {
         let together = (3.0 * pole_per_s + plant.state_gain_per_s) / plant.input_gain;
         let square = plant.input_gain * plant.input_gain;
         Self {
@@ -178,7 +178,7 @@ impl Adaptation {
     }
 }
 
-impl FirstOrder {
+impl ScalarPlant {
     /// What the output becomes of itself, and of an input that is held, in a
     /// time \[s\]: e^(a·t) and b·∫e^(a·s)ds.
     pub fn held(&self, t_s: f64) -> (f64, f64) {
@@ -199,7 +199,7 @@ pub(super) fn mean_exp(x: f64) -> f64 {
 
 /// Checks a law in continuous time: eq. (11), γ and p above zero, and the
 /// Routh–Hurwitz condition of the error where the slope is learnt as well.
-pub(super) fn check(plant: FirstOrder, gains: &Gains, hold: Span) -> Result<(), GainError> {
+pub(super) fn check(plant: ScalarPlant, gains: &Gains, hold: Span) -> Result<(), GainError> {
     all_finite(plant, gains)?;
     positive("the time that a command is held", hold.secs())?;
     if plant.input_gain == 0.0 {
@@ -250,7 +250,7 @@ fn positive(what: &'static str, value: f64) -> Result<(), GainError> {
     if value > 0.0 { Ok(()) } else { Err(GainError::NotPositive { what, value }) }
 }
 
-fn all_finite(plant: FirstOrder, gains: &Gains) -> Result<(), GainError> {
+fn all_finite(plant: ScalarPlant, gains: &Gains) -> Result<(), GainError> {
     let (learning_rate, weight, slope) = match gains.adaptation {
         Adaptation::Off => (0.0, 0.0, 0.0),
         Adaptation::Constant { learning_rate, weight } => (learning_rate, weight, 0.0),

@@ -3,7 +3,7 @@
 use nalgebra::Matrix4;
 
 use super::estimate::Estimate;
-use super::gains::{Adaptation, FirstOrder, GainError, Gains, check};
+use super::gains::{Adaptation, GainError, Gains, ScalarPlant, check};
 use crate::time::Span;
 
 /// Samples that may be missed before the time between two is a gap.
@@ -17,8 +17,8 @@ const GAP: f64 = 4.0;
 /// long a command is held. The error's part is the continuous law, with the
 /// estimate led by half a sample ([`Self::step`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Law {
-    plant: FirstOrder,
+pub struct AdaptiveLaw {
+    plant: ScalarPlant,
     gains: Gains,
     hold: Span,
     /// The plant and the reference model over one held command.
@@ -52,11 +52,11 @@ pub struct Action {
     pub foretold: f64,
 }
 
-impl Law {
+impl AdaptiveLaw {
     /// A law whose commands are held for `hold`. Fails where reference model
     /// or error are not stable, in continuous time or at that rate of
     /// commands, and where a gain has the wrong sign.
-    pub fn new(plant: FirstOrder, gains: Gains, hold: Span) -> Result<Self, GainError> {
+    pub fn new(plant: ScalarPlant, gains: Gains, hold: Span) -> Result<Self, GainError> {
         check(plant, &gains, hold)?;
         let (state_step, input_step) = plant.held(hold.secs());
         let (estimate, model, last) = (Estimate::default(), 0.0, None);
@@ -156,7 +156,7 @@ impl Law {
     }
 
     /// The plant that the law is made for.
-    pub fn plant(&self) -> FirstOrder {
+    pub fn plant(&self) -> ScalarPlant {
         self.plant
     }
 
@@ -178,7 +178,7 @@ impl Law {
     }
 
     fn model_held(&self, t_s: f64) -> (f64, f64) {
-        let model = FirstOrder { state_gain_per_s: self.model_pole(), ..self.plant };
+        let model = ScalarPlant { state_gain_per_s: self.model_pole(), ..self.plant };
         model.held(t_s)
     }
 

@@ -1,7 +1,7 @@
 use super::*;
 
 /// Sub-system 1 as it was fitted to table 1 of Mohammadi Looey et al. 2026.
-const PLANT: FirstOrder = FirstOrder { state_gain_per_s: -1.0, input_gain: 1.0 };
+const PLANT: ScalarPlant = ScalarPlant { state_gain_per_s: -1.0, input_gain: 1.0 };
 const LEARN: Adaptation = Adaptation::Constant { learning_rate: 1.786, weight: 1.0 };
 const HOLD: Span = Span::from_millis(10);
 
@@ -14,7 +14,7 @@ fn ramp(slope_rate_per_s: f64) -> Adaptation {
 }
 
 /// The plant over a held input, with an unknown part that runs straight.
-fn plant(plant: FirstOrder, y: f64, input: f64, unknown: (f64, f64), t: f64) -> f64 {
+fn plant(plant: ScalarPlant, y: f64, input: f64, unknown: (f64, f64), t: f64) -> f64 {
     let (kept, driven) = plant.held(t);
     let mean = 0.5 * (unknown.0 + unknown.1);
     // The straight part's first moment, by Simpson's rule on e^(a(t−s)).
@@ -24,7 +24,7 @@ fn plant(plant: FirstOrder, y: f64, input: f64, unknown: (f64, f64), t: f64) -> 
 }
 
 /// Runs a law on its plant and returns the last action.
-fn run(law: &mut Law, unknown: impl Fn(f64) -> f64, seconds: f64) -> Vec<Action> {
+fn run(law: &mut AdaptiveLaw, unknown: impl Fn(f64) -> f64, seconds: f64) -> Vec<Action> {
     let h = law.hold().secs();
     let (mut y, mut t, mut dt, mut actions) = (0.0, 0.0, Span::ZERO, Vec::new());
     while t < seconds {
@@ -39,7 +39,7 @@ fn run(law: &mut Law, unknown: impl Fn(f64) -> f64, seconds: f64) -> Vec<Action>
 #[test]
 fn a_constant_uncertainty_is_learnt_as_the_closed_form_says() {
     // ë + a·ė + ω²·e = 0 with e(0) = 0, ė(0) = β·Δ: e = Δ/ω_d·e^(−at/2)·sin ω_d t.
-    let mut law = Law::new(PLANT, gains(LEARN), HOLD).unwrap();
+    let mut law = AdaptiveLaw::new(PLANT, gains(LEARN), HOLD).unwrap();
     let actions = run(&mut law, |_| 0.0025, 8.0);
     let (a, square) = (2.604, 1.786);
     let own = f64::sqrt(square - 0.25 * a * a);
@@ -54,11 +54,11 @@ fn a_constant_uncertainty_is_learnt_as_the_closed_form_says() {
 #[test]
 fn a_ramp_leaves_the_errors_of_the_formula_at_any_rate_of_commands() {
     let slope = -0.0005;
-    let other = FirstOrder { state_gain_per_s: -1.2, input_gain: -0.6 };
+    let other = ScalarPlant { state_gain_per_s: -1.2, input_gain: -0.6 };
     for (on, feedback) in [(PLANT, 1.604), (other, -2.0)] {
         for ms in [1, 10, 50] {
             let gains = Gains { feedback, ..gains(LEARN) };
-            let mut law = Law::new(on, gains, Span::from_millis(ms)).unwrap();
+            let mut law = AdaptiveLaw::new(on, gains, Span::from_millis(ms)).unwrap();
             let formula = law.ramp_errors(slope);
             assert!((formula.output / (slope / (1.786 * on.input_gain)) - 1.0).abs() < 1e-12);
             let actions = run(&mut law, |t| slope * t, 60.0);
@@ -74,7 +74,7 @@ fn a_ramp_leaves_the_errors_of_the_formula_at_any_rate_of_commands() {
 
 #[test]
 fn with_the_slope_learnt_a_ramp_leaves_nothing() {
-    let mut law = Law::new(PLANT, gains(ramp(0.3)), HOLD).unwrap();
+    let mut law = AdaptiveLaw::new(PLANT, gains(ramp(0.3)), HOLD).unwrap();
     let end = *run(&mut law, |t| -0.0005 * t, 120.0).last().unwrap();
     assert!(end.error.abs() < 1e-12, "{end:?}");
     assert_eq!(law.ramp_errors(-0.0005).output, 0.0);
@@ -83,10 +83,10 @@ fn with_the_slope_learnt_a_ramp_leaves_nothing() {
 #[test]
 fn a_triple_pole_is_where_it_was_asked_for() {
     // Δ = d: e = β·d·t·(1 − …)e^(−pt) has the closed form β·d·(t − p·t²/2)·e^(−pt).
-    let plant = FirstOrder { state_gain_per_s: -1.2, input_gain: -0.6 };
+    let plant = ScalarPlant { state_gain_per_s: -1.2, input_gain: -0.6 };
     let pole = 2.2;
     let gains = Gains::triple_pole(plant, -2.0, pole);
-    let mut law = Law::new(plant, gains, Span::from_millis(1)).unwrap();
+    let mut law = AdaptiveLaw::new(plant, gains, Span::from_millis(1)).unwrap();
     for (step, action) in run(&mut law, |_| 0.01, 4.0).iter().enumerate() {
         let t = 0.001 * f64::from(u32::try_from(step).unwrap());
         let truth = -0.6 * 0.01 * (t - 0.5 * pole * t * t) * libm::exp(-pole * t);
@@ -97,7 +97,7 @@ fn a_triple_pole_is_where_it_was_asked_for() {
 #[test]
 fn the_reference_is_followed_exactly_however_long_a_command_is_held() {
     for ms in [1, 20, 200] {
-        let mut law = Law::new(PLANT, gains(LEARN), Span::from_millis(ms)).unwrap();
+        let mut law = AdaptiveLaw::new(PLANT, gains(LEARN), Span::from_millis(ms)).unwrap();
         let (mut y, mut dt, reference) = (0.0, Span::ZERO, 0.13);
         for _ in 0..100 {
             let action = law.step(y, reference, 0.0, dt);
@@ -114,7 +114,7 @@ fn the_reference_is_followed_exactly_however_long_a_command_is_held() {
 
 #[test]
 fn a_limit_is_no_error_to_learn_from() {
-    let mut law = Law::new(PLANT, gains(LEARN), HOLD).unwrap();
+    let mut law = AdaptiveLaw::new(PLANT, gains(LEARN), HOLD).unwrap();
     let (mut y, mut dt) = (0.0, Span::ZERO);
     for _ in 0..300 {
         let action = law.step(y, 0.2, 0.0, dt);
@@ -129,7 +129,7 @@ fn a_limit_is_no_error_to_learn_from() {
 
 #[test]
 fn it_starts_without_a_bump_from_what_is_applied() {
-    let mut law = Law::new(PLANT, gains(ramp(0.3)), HOLD).unwrap();
+    let mut law = AdaptiveLaw::new(PLANT, gains(ramp(0.3)), HOLD).unwrap();
     law.start(0.05, 0.041, 0.003);
     let action = law.step(0.05, law.reference_for(0.05), 0.003, Span::ZERO);
     assert!((action.command - 0.041).abs() < 1e-15, "{action:?}");
@@ -140,7 +140,7 @@ fn it_starts_without_a_bump_from_what_is_applied() {
 fn the_estimate_stays_within_its_bound_and_leaves_it_again() {
     let safety = Safety { bound: Some(0.002), leakage_per_s: 0.0 };
     for adaptation in [LEARN, ramp(0.3)] {
-        let mut law = Law::new(PLANT, Gains { safety, ..gains(adaptation) }, HOLD).unwrap();
+        let mut law = AdaptiveLaw::new(PLANT, Gains { safety, ..gains(adaptation) }, HOLD).unwrap();
         let actions = run(&mut law, |t| if t < 30.0 { 0.01 } else { 0.001 }, 60.0);
         assert!(actions.iter().all(|action| action.estimate.abs() <= 0.002));
         assert!(actions[2900].estimate == 0.002);
@@ -151,7 +151,7 @@ fn the_estimate_stays_within_its_bound_and_leaves_it_again() {
 #[test]
 fn leakage_leaves_the_error_that_is_told() {
     let safety = Safety { bound: None, leakage_per_s: 0.1 };
-    let mut law = Law::new(PLANT, Gains { safety, ..gains(LEARN) }, HOLD).unwrap();
+    let mut law = AdaptiveLaw::new(PLANT, Gains { safety, ..gains(LEARN) }, HOLD).unwrap();
     let end = *run(&mut law, |_| 0.01, 40.0).last().unwrap();
     let told = 0.1 * 0.01 / (2.604 * 0.1 + 1.786);
     assert!((end.error / told - 1.0).abs() < 1e-3, "{end:?} {told}");
@@ -159,7 +159,7 @@ fn leakage_leaves_the_error_that_is_told() {
 
 #[test]
 fn a_gap_and_a_reading_that_is_no_number_are_not_learnt_from() {
-    let mut law = Law::new(PLANT, gains(LEARN), HOLD).unwrap();
+    let mut law = AdaptiveLaw::new(PLANT, gains(LEARN), HOLD).unwrap();
     let _ = run(&mut law, |_| 0.0025, 8.0);
     let before = law.estimate();
     let lost = law.step(f64::NAN, 0.0, 0.0, HOLD);
@@ -170,17 +170,17 @@ fn a_gap_and_a_reading_that_is_no_number_are_not_learnt_from() {
 
 #[test]
 fn what_is_not_stable_is_refused_with_its_facts() {
-    let new = |plant, gains, ms| Law::new(plant, gains, Span::from_millis(ms)).unwrap_err();
+    let new = |plant, gains, ms| AdaptiveLaw::new(plant, gains, Span::from_millis(ms)).unwrap_err();
     let low = Gains { feedback: -1.5, ..gains(LEARN) };
     assert!(matches!(new(PLANT, low, 10), GainError::Reference { pole, .. } if pole == 0.5));
-    let wrong_sign = FirstOrder { input_gain: -1.0, ..PLANT };
+    let wrong_sign = ScalarPlant { input_gain: -1.0, ..PLANT };
     assert!(matches!(new(wrong_sign, gains(LEARN), 10), GainError::Reference { .. }));
     let less = Gains { error_feedback: -3.0, ..gains(LEARN) };
     assert!(matches!(new(PLANT, less, 10), GainError::Error { .. }));
     let nothing = Adaptation::Constant { learning_rate: 0.0, weight: 1.0 };
     let message = new(PLANT, gains(nothing), 10).to_string();
     assert!(message.starts_with("the learning rate is 0: it must be above 0"), "{message}");
-    let no_input = FirstOrder { input_gain: 0.0, ..PLANT };
+    let no_input = ScalarPlant { input_gain: 0.0, ..PLANT };
     assert_eq!(new(no_input, gains(LEARN), 10), GainError::NoInput);
     let nan = Gains { feedback: f64::NAN, ..gains(LEARN) };
     assert!(matches!(new(PLANT, nan, 10), GainError::NotFinite { what: "the feedback", .. }));
@@ -190,19 +190,19 @@ fn what_is_not_stable_is_refused_with_its_facts() {
         GainError::NotPositive { what: "the leakage", .. }
     ));
     assert!(matches!(new(PLANT, gains(LEARN), 900), GainError::TooSeldom { .. }));
-    assert!(Law::new(PLANT, gains(Adaptation::Off), HOLD).is_ok());
+    assert!(AdaptiveLaw::new(PLANT, gains(Adaptation::Off), HOLD).is_ok());
 }
 
 #[test]
 fn the_slope_rate_is_refused_exactly_where_the_error_begins_to_grow() {
     // Hurwitz: λ < a without leakage.
     let fine = Span::from_ns(100_000);
-    assert!(Law::new(PLANT, gains(ramp(2.6)), fine).is_ok());
-    let refused = Law::new(PLANT, gains(ramp(2.61)), fine).unwrap_err();
+    assert!(AdaptiveLaw::new(PLANT, gains(ramp(2.6)), fine).is_ok());
+    let refused = AdaptiveLaw::new(PLANT, gains(ramp(2.61)), fine).unwrap_err();
     assert_eq!(refused, GainError::SlopeRate { rate: 2.61, limit: 2.604 });
     // With leakage the roots on the axis: s = i·w at the limit.
     let safety = Safety { bound: None, leakage_per_s: 0.2 };
-    let with = |rate| Law::new(PLANT, Gains { safety, ..gains(ramp(rate)) }, fine);
+    let with = |rate| AdaptiveLaw::new(PLANT, Gains { safety, ..gains(ramp(rate)) }, fine);
     let GainError::SlopeRate { limit, .. } = with(100.0).unwrap_err() else { unreachable!() };
     let (a, leak, square) = (2.604, 0.2, 1.786);
     let w2 = leak * leak + 2.0 * a * leak + square;
@@ -218,7 +218,7 @@ fn both_laws_hold_a_strand_without_a_trace_of_the_coupling() {
         nozzle: PLANT,
         swell: 1.2,
         push_per_s: 0.6,
-        strand: FirstOrder { state_gain_per_s: -1.2, input_gain: 0.6 },
+        strand: ScalarPlant { state_gain_per_s: -1.2, input_gain: 0.6 },
     };
     let strand = Gains { feedback: 2.0, ..gains(LEARN) };
     let mut laws = Adaptive::new(model, gains(LEARN), strand, HOLD).unwrap();

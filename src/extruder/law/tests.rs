@@ -1,7 +1,7 @@
 //! Laws under the supervisor, against plants.
 
 use super::*;
-use crate::extruder::adaptive::{Adaptation, FirstOrder, Gains, Law as AdaptiveLaw, Safety};
+use crate::extruder::adaptive::{Adaptation, AdaptiveLaw, Gains, Safety, ScalarPlant};
 use crate::extruder::feedforward::{InverseSettings, RightZeros, Tracker};
 use crate::extruder::limits::CommandLimits;
 use crate::extruder::pressure::kalman::Noise;
@@ -17,8 +17,8 @@ use crate::extruder::{
     Drive, ExtruderHold, ExtruderSetup, ExtruderState, Laying, PumpMode, Supervisor,
 };
 use crate::model::{Between, Simulator, TransferFunction};
-use crate::sim::pressure::{Disturbed, Plant};
-use crate::sim::screw::{Integrator, ScrewPlant};
+use crate::sim::pressure::{Disturbed, SimPressure};
+use crate::sim::screw::{Integrator, SimScrew};
 use crate::units::{MPa, Mm, Mm2, Rpm};
 
 const TICK: Span = Span::from_millis(5);
@@ -109,7 +109,7 @@ fn commanded(
     all
 }
 
-struct Pressed(Plant);
+struct Pressed(SimPressure);
 
 impl Machine for Pressed {
     fn advance(&mut self, command: Option<f64>) {
@@ -136,7 +136,7 @@ fn pressed(choice: fn(&Fopdt, Noise) -> PressureChoice) -> (Supervisor, Pressed)
     let side = supervisor(Drive::Rpm, Law::Pressure(Box::new(PressureLoop::new(settings))), limits);
     let rest = Running { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO };
     let disturbed = Disturbed { noise_mpa2: 1e-6, seed: 7, ..Disturbed::default() };
-    (side, Pressed(Plant::new(process, disturbed, Rpm::constant(90.0), rest)))
+    (side, Pressed(SimPressure::new(process, disturbed, Rpm::constant(90.0), rest)))
 }
 
 fn predictive(process: &Fopdt, noise: Noise) -> PressureChoice {
@@ -239,7 +239,7 @@ fn foreseen() -> (Supervisor, Box<dyn Machine>) {
 }
 
 fn adaptive() -> (Supervisor, Box<dyn Machine>) {
-    let plant = FirstOrder { state_gain_per_s: -2.0, input_gain: 4.0 };
+    let plant = ScalarPlant { state_gain_per_s: -2.0, input_gain: 4.0 };
     let adaptation = Adaptation::Ramp { learning_rate: 0.5, weight: 1.0, slope_rate_per_s: 0.3 };
     let safety = Safety { bound: Some(0.001), leakage_per_s: 0.0 };
     let gains = Gains { feedback: 0.2, error_feedback: 0.0, adaptation, safety };
@@ -252,7 +252,7 @@ fn adaptive() -> (Supervisor, Box<dyn Machine>) {
     (side, Box::new(Lagging::new(0.9 * 2e5, 0.5)))
 }
 
-struct Filled(ScrewPlant);
+struct Filled(SimScrew);
 
 impl Machine for Filled {
     fn advance(&mut self, command: Option<f64>) {
@@ -282,7 +282,7 @@ fn screw() -> (Supervisor, Filled) {
     let law = Law::Screw(ScrewFill::new(&settings).unwrap());
     let side = supervisor(Drive::Filling, law, CommandLimits::new(0.0, 0.9, 1e3).unwrap());
     let scheme = Integrator::RungeKutta(TICK.secs());
-    (side, Filled(ScrewPlant::new(screw, scheme, TICK.secs(), 0.1, screw.holding(0.1))))
+    (side, Filled(SimScrew::new(screw, scheme, TICK.secs(), 0.1, screw.holding(0.1))))
 }
 
 #[test]

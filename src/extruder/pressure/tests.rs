@@ -10,7 +10,7 @@ use super::tuning::Tuning;
 use super::vsfc::{Vsfc, VsfcGains};
 use super::*;
 use crate::extruder::limits::CommandLimits;
-use crate::sim::pressure::{Disturbed, Plant};
+use crate::sim::pressure::{Disturbed, SimPressure};
 use crate::units::{MPa, Rpm};
 
 const FASTEST: Rpm = Rpm::constant(3.0);
@@ -53,7 +53,7 @@ fn running(pressure: f64, target: f64, speed: f64) -> Running {
 /// at 20 Hz, and gives pressure and speed of every tick.
 fn drive(
     law: &mut dyn PressureLaw,
-    plant: &mut Plant,
+    plant: &mut SimPressure,
     until_s: f64,
     target: impl Fn(f64) -> f64,
 ) -> Vec<(f64, f64)> {
@@ -91,7 +91,7 @@ fn a_law_that_takes_over_begins_with_the_speed_that_runs() {
 fn switching_to_any_law_in_the_middle_of_a_step_is_no_jump() {
     for which in 0..4 {
         let start = running(0.0, 0.0, 0.0);
-        let mut plant = Plant::new(model(), Disturbed::default(), FASTEST, start);
+        let mut plant = SimPressure::new(model(), Disturbed::default(), FASTEST, start);
         let mut before = ours(free(), start);
         drive(&mut before, &mut plant, 1.0, |_| 0.6);
         let now = running(plant.pressure(), 0.6, plant.speed_rpm());
@@ -109,7 +109,7 @@ fn nothing_winds_up_while_the_target_is_out_of_reach() {
     for which in 0..4 {
         let start = running(0.6, 0.6, 0.6);
         let (name, mut law) = laws(free(), start).into_iter().nth(which).unwrap();
-        let mut plant = Plant::new(model(), Disturbed::default(), FASTEST, start);
+        let mut plant = SimPressure::new(model(), Disturbed::default(), FASTEST, start);
         drive(law.as_mut(), &mut plant, 60.0, |_| 5.0);
         assert!(plant.speed_rpm() > 2.99, "{name}");
         let course = drive(law.as_mut(), &mut plant, 90.0, |_| 0.6);
@@ -126,7 +126,7 @@ fn a_limit_beyond_its_own_that_a_law_is_told_of_winds_nothing_up() {
     for which in 0..4 {
         let start = running(0.6, 0.6, 0.6);
         let (name, mut law) = laws(free(), start).into_iter().nth(which).unwrap();
-        let mut plant = Plant::new(model(), Disturbed::default(), FASTEST, start);
+        let mut plant = SimPressure::new(model(), Disturbed::default(), FASTEST, start);
         let mut falls_s = None;
         for tick in 0..12_000_u64 {
             let now = Stamp::from_secs(plant.now_s());
@@ -155,7 +155,7 @@ fn commands_keep_the_rate_and_ours_keeps_its_foresight_under_it() {
     let limits = CommandLimits::new(0.1, 2.0, 1.5).unwrap();
     let start = running(0.1, 0.1, 0.1);
     for (name, mut law) in laws(limits, start) {
-        let mut plant = Plant::new(model(), Disturbed::default(), FASTEST, start);
+        let mut plant = SimPressure::new(model(), Disturbed::default(), FASTEST, start);
         let course = drive(law.as_mut(), &mut plant, 10.0, |_| 1.2);
         for pair in course.windows(2) {
             let step = (pair[1].1 - pair[0].1).abs();
@@ -213,7 +213,7 @@ fn a_step_tells_ours_by_how_much_its_model_is_off() {
         let start = running(0.0, 0.0, 0.0);
         let process = Fopdt::new(gain, lag, dead).unwrap();
         let disturbed = Disturbed { noise_mpa2: 4.98e-5, seed: 3, ..Disturbed::default() };
-        let mut plant = Plant::new(process, disturbed, FASTEST, start);
+        let mut plant = SimPressure::new(process, disturbed, FASTEST, start);
         let mut law = ours(free(), start);
         drive(&mut law, &mut plant, 4.0, |_| 0.6);
         // The plant takes a command over a tick late.
@@ -235,7 +235,7 @@ fn a_process_without_dead_time_is_held_as_well() {
     let limits = CommandLimits::new(0.0, 300.0, 1e6).unwrap();
     let start = running(1.0, 1.0, 50.0);
     let mut law = Predictive::new(process, tuning, limits, start);
-    let mut plant = Plant::new(process, Disturbed::default(), Rpm::constant(300.0), start);
+    let mut plant = SimPressure::new(process, Disturbed::default(), Rpm::constant(300.0), start);
     let course = drive(&mut law, &mut plant, 20.0, |_| 2.0);
     let highest = course.iter().map(|(pressure, _)| *pressure).fold(0.0, f64::max);
     assert!(highest < 2.01, "{highest}");

@@ -4,7 +4,7 @@
 use super::error::{ScrewError, positive};
 use super::euler::{Euler, whole};
 use super::exact::{Exact, Overtaken, Prediction};
-use super::history::History;
+use super::history::FeedHistory;
 use super::law::FillLaw;
 use super::model::{Conveying, Screw};
 use crate::time::{Span, Stamp};
@@ -52,7 +52,7 @@ pub struct ScrewControl {
 
 #[derive(Debug, Clone, PartialEq)]
 enum Predictor {
-    Exact { exact: Exact, history: History },
+    Exact { exact: Exact, history: FeedHistory },
     Paper(Euler),
 }
 
@@ -131,7 +131,7 @@ impl ScrewControl {
         let predictor = match settings.scheme {
             Scheme::Exact => Predictor::Exact {
                 exact: Exact::new(screw),
-                history: History::new(room, settings.before),
+                history: FeedHistory::new(room, settings.before),
             },
             Scheme::Paper if screw.conveying == Conveying::AtSpeedOnTheWay => {
                 return Err(ScrewError::SchemeOnTheWay);

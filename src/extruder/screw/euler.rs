@@ -93,7 +93,7 @@ pub(super) fn whole(steps: f64) -> usize {
 mod tests {
     use super::*;
     use crate::extruder::screw::exact::Exact;
-    use crate::extruder::screw::history::History;
+    use crate::extruder::screw::history::FeedHistory;
     use crate::extruder::screw::{Pulsation, ScrewDesign};
 
     #[test]
@@ -101,7 +101,7 @@ mod tests {
         let pulsation = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
         let screw = ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap();
         let feed = |at_s: f64| if at_s < 0.7 { 0.2 } else { 0.6 };
-        let mut history = History::new(8, 0.2);
+        let mut history = FeedHistory::new(8, 0.2);
         history.push(0.7, 0.6);
         let truth = Exact::new(screw).predict(&history, 1.2, 0.12).unwrap();
         let missed = |step_s: f64| {

@@ -9,7 +9,7 @@
 //! changes: of fourth order, or of second where the feed changes so often that
 //! the steps are shorter than that needs.
 
-use super::history::{History, Piece};
+use super::history::{FeedHistory, Piece};
 use super::model::{Conveying, Screw};
 
 /// What is foretold.
@@ -79,7 +79,7 @@ impl Exact {
     /// Foretells from a plug that was measured now.
     pub fn predict(
         &self,
-        history: &History,
+        history: &FeedHistory,
         now_s: f64,
         plug_m: f64,
     ) -> Result<Prediction, Overtaken> {
@@ -223,8 +223,8 @@ mod tests {
     }
 
     /// A feed that changes every 20 ms from `from_s` on for a second and a half.
-    fn fed(predictor: &Exact, from_s: f64) -> History {
-        let mut history = History::new(100, 0.2);
+    fn fed(predictor: &Exact, from_s: f64) -> FeedHistory {
+        let mut history = FeedHistory::new(100, 0.2);
         for k in 0..75 {
             let at = f64::from(k);
             history.push(predictor.place(from_s + 0.02 * at), 0.45 + 0.4 * (0.3 * at).sin());
@@ -269,7 +269,8 @@ mod tests {
         for pulsation in [A, Pulsation { share: 0.4, rad_per_s: 0.4, phase_rad: 2.0 }] {
             let predictor = Exact::new(screw(pulsation));
             let fill = |k: i32| 0.45 + 0.4 * (1.7 * f64::from(k)).sin();
-            let (mut coarse, mut fine) = (History::new(500, 0.2), History::new(40_000, 0.2));
+            let (mut coarse, mut fine) =
+                (FeedHistory::new(500, 0.2), FeedHistory::new(40_000, 0.2));
             for k in 0..400 {
                 coarse.push(0.005 * f64::from(k), fill(k));
                 for part in 0..100 {
@@ -288,7 +289,7 @@ mod tests {
     #[test]
     fn a_feed_that_does_not_arrive_is_said_to_be_overtaken() {
         let fast = Exact::new(screw(Pulsation { share: 0.5, rad_per_s: 6.0, phase_rad: 0.0 }));
-        let history = History::new(4, 0.0);
+        let history = FeedHistory::new(4, 0.0);
         let mut found = (0..20).map(|k| fast.predict(&history, 0.1 * f64::from(k), 0.02));
         let fault = found.find_map(Result::err).unwrap();
         assert!(fault.growth > 0.98 && fault.plug_m >= 0.0);

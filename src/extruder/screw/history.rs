@@ -4,7 +4,7 @@
 /// Changes of the feed over a coordinate that only grows: seconds, or metres
 /// that were conveyed. It holds a fixed number and forgets the oldest.
 #[derive(Debug, Clone, PartialEq)]
-pub struct History {
+pub struct FeedHistory {
     changes: Box<[Change]>,
     /// Place of the oldest, and how many there are.
     first: usize,
@@ -30,7 +30,7 @@ pub struct Piece {
     pub fill: f64,
 }
 
-impl History {
+impl FeedHistory {
     /// Room for a number of changes, at least one, after a feed that has been
     /// held for as long as matters.
     pub fn new(capacity: usize, before: f64) -> Self {
@@ -133,13 +133,13 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn pieces(history: &History, from: f64, to: f64) -> Vec<(f64, f64)> {
+    fn pieces(history: &FeedHistory, from: f64, to: f64) -> Vec<(f64, f64)> {
         history.pieces(from, to).map(|piece| (piece.length, piece.fill)).collect()
     }
 
     #[test]
     fn what_was_held_before_the_first_change_lasts_until_it() {
-        let mut history = History::new(4, 0.2);
+        let mut history = FeedHistory::new(4, 0.2);
         assert_eq!(pieces(&history, -1.0, 1.0), [(2.0, 0.2)]);
         history.push(0.5, 0.7);
         history.push(1.5, 0.7);
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn what_was_applied_takes_the_place_of_what_was_decided() {
-        let mut history = History::new(4, 0.2);
+        let mut history = FeedHistory::new(4, 0.2);
         history.push(1.0, 0.9);
         history.amend(0.6);
         assert_eq!(pieces(&history, 0.0, 2.0), [(1.0, 0.2), (1.0, 0.6)]);
@@ -169,7 +169,7 @@ mod tests {
             fills in prop::collection::vec(0.0..0.9_f64, 1..40),
             from in 0.0..5.0_f64,
         ) {
-            let mut history = History::new(8, 0.5);
+            let mut history = FeedHistory::new(8, 0.5);
             for (second, fill) in (0_u32..).zip(&fills) {
                 history.push(f64::from(second), *fill);
             }

@@ -8,7 +8,7 @@ use super::course::{Course, Sample};
 use super::{SETPOINT, START};
 use crate::extruder::screw::control::{Scheme, ScrewSettings};
 use crate::extruder::screw::{FillLaw, Screw, ScrewControl, ScrewError, ScrewFault};
-use crate::sim::screw::{Integrator, ScrewPlant};
+use crate::sim::screw::{Integrator, SimScrew};
 use crate::time::{Span, Stamp};
 use crate::units::Mm;
 
@@ -90,7 +90,7 @@ pub fn follow(plan: &Plan, method: &Method) -> Result<Course, RunError> {
     let start_m = START.get() / MM_PER_M;
     let before = plan.screw.holding(start_m);
     let step_s = f64::from(plan.step_ms) / 1000.0;
-    let mut plant = ScrewPlant::new(plan.screw, plan.integrator, step_s, start_m, before);
+    let mut plant = SimScrew::new(plan.screw, plan.integrator, step_s, start_m, before);
     let mut feeder = Feeder::new(plan, method, before)?;
     let mut noise = Xoshiro256PlusPlus::seed_from_u64(plan.seed);
     let mut course = Course::default();

@@ -5,7 +5,7 @@ use super::{Plant, STEP};
 use crate::config::extruder::ScrewPlant as Settings;
 use crate::extruder::ExtruderReport;
 use crate::sim::hash::{mix, normal_pair};
-use crate::sim::screw::{Integrator, ScrewPlant};
+use crate::sim::screw::{Integrator, SimScrew};
 use crate::units::{Mm, Mm3PerS};
 
 const SENSOR: u64 = 0x0073_6372_6577;
@@ -15,7 +15,7 @@ const MOST: f64 = 0.999;
 /// The plant with its sensor.
 #[derive(Debug)]
 pub struct Filled {
-    plant: ScrewPlant,
+    plant: SimScrew,
     settings: Settings,
     seed: u64,
     reports: u64,
@@ -27,7 +27,7 @@ impl Filled {
     pub fn new(settings: &Settings, seed: u64) -> Self {
         let scheme = Integrator::RungeKutta(STEP.secs());
         let Settings { screw, start_m, before, .. } = *settings;
-        let plant = ScrewPlant::new(screw, scheme, STEP.secs(), start_m, before);
+        let plant = SimScrew::new(screw, scheme, STEP.secs(), start_m, before);
         Self { plant, settings: *settings, seed, reports: 0, turns: false }
     }
 }

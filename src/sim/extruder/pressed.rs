@@ -6,13 +6,13 @@ use crate::config::extruder::PressurePlant;
 use crate::extruder::ExtruderReport;
 use crate::extruder::pressure::Running;
 use crate::extruder::rheology::PowerLaw;
-use crate::sim::pressure::{Disturbed, Drift, Load, Plant as Process, TICK_S};
+use crate::sim::pressure::{Disturbed, Drift, Load, SimPressure, TICK_S};
 use crate::units::{MPa, Mm3PerS, Rpm};
 
 /// The plant with its nozzle.
 #[derive(Debug)]
 pub struct Pressed {
-    process: Process,
+    process: SimPressure,
     nozzle: PowerLaw,
     /// Time since the process was advanced last \[s\].
     waits_s: f64,
@@ -30,7 +30,7 @@ impl Pressed {
             seed,
         };
         let rest = Running { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO };
-        let process = Process::new(plant.process, disturbed, plant.fastest, rest);
+        let process = SimPressure::new(plant.process, disturbed, plant.fastest, rest);
         Self { process, nozzle: plant.nozzle, waits_s: 0.0 }
     }
 }
