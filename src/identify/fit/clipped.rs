@@ -203,7 +203,8 @@ impl<'a> Signal<'a> {
         inner.sort_by(f64::total_cmp);
         inner.dedup();
         let mean = inner_visits / inner.len().max(1) as f64;
-        inner.len().min(follow) >= FEWEST
+        inner.len() >= FEWEST
+            && 2 * follow >= FEWEST
             && visits >= ARRIVALS
             && visits as f64 >= ARRIVALS as f64 * mean
     }

@@ -75,6 +75,9 @@ fn random_levels_that_are_held_and_cut_at_one_limit_are_cut_off() {
     assert_eq!(input(held(levels.iter().copied(), 25)), Ok(()));
     let cut = input(held(levels.iter().map(|level| level.min(33.0)), 25)).unwrap_err();
     assert_eq!((cut.end, cut.value), (End::Largest, 33.0));
+    // A short log that is cut often.
+    let short = levels.iter().take(32).map(|level| level.min(31.0));
+    assert_eq!(input(held(short, 75)).unwrap_err().value, 31.0);
     let share = levels.iter().filter(|level| **level > 33.0).count();
     assert!((cut.share_percent - f64::from(u32::try_from(share).unwrap()) / 0.8).abs() < 2.6);
     let said = cut.to_string();
