@@ -429,7 +429,8 @@ fn a_flow_that_was_measured_on_the_bead_is_the_flow_at_the_nozzle() {
     let ask = |args: &str, code| {
         let mut command = truebead(&["identify"]);
         command.arg(&log).args(args.split(' ')).args(["--model", "sopdt", "--input", "screw_rpm"]);
-        said(command.arg("--out").arg(folder.path().join("m")), code)
+        let out = tempfile::tempdir_in(folder.path()).unwrap();
+        said(command.arg("--out").arg(out.path()), code)
     };
     let aligned = "--speed wheel_mm_per_s --position way_mm --measured-at-offset-mm 40";
     for of in ["--area area_mm2", "--width width_mm --layer-height-mm 2"] {

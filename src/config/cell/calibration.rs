@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::config::table::Table;
+use crate::document::Table;
 
 /// Sizes of a pixel at the surface that are taken \[mm/px\].
 const SCALE_MM_PER_PX: std::ops::RangeInclusive<f64> = 1e-6..=1e3;

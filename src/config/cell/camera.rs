@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::config::table::Table;
+use crate::document::Table;
 use crate::time::Span;
 use crate::units::Mm;
 

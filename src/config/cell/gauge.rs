@@ -1,6 +1,6 @@
 //! `[gauge]`: where and how the bead is measured.
 
-use crate::config::table::Table;
+use crate::document::Table;
 use crate::frame::Channel;
 use crate::geometry::Roi;
 use crate::units::Mm;

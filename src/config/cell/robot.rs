@@ -1,7 +1,7 @@
 //! `[robot]`: how a live run reaches the robot, and how a bead begins.
 
-use crate::config::table::Table;
 use crate::control::limiter::Limits;
+use crate::document::Table;
 use crate::units::{Mm, MmPerS};
 
 /// The robot of a cell.
