@@ -25,8 +25,11 @@ use crate::control::{
     Command, Event, Fault, Hold, Limit, RobotMode, RobotState, State, Step, Trace,
 };
 use crate::extruder::{ExtruderSetup, FlowDemand, Supervisor};
-use crate::time::Stamp;
+use crate::time::{Span, Stamp};
 use crate::units::{Mm, MmPerS};
+
+/// How long a robot holds before it stops, by its link's protocol.
+const HOLD_TIME: Span = Span::from_millis(1000);
 
 /// Everything the controller has to know of its cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,6 +44,8 @@ pub struct Setup {
     pub start_length: Mm,
     /// Path length from the nozzle back to the middle of the gauge.
     pub camera_offset: Mm,
+    /// How long a robot that hears nothing lays bead before it stops by itself.
+    pub alone_for: Span,
 }
 
 impl From<&RunPart> for Setup {
@@ -51,6 +56,7 @@ impl From<&RunPart> for Setup {
             start_speed: run.robot.start_speed,
             start_length: run.robot.start_length,
             camera_offset: run.camera.offset,
+            alone_for: Span::from_millis(i64::from(run.robot.valid_ms)) + HOLD_TIME,
         }
     }
 }

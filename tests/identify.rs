@@ -361,12 +361,13 @@ fn from_a_simulated_run_to_a_cell_with_the_model() {
     // A cell that commands by that model.
     let cells = Path::new(env!("CARGO_MANIFEST_DIR")).join("cells");
     let text = fs::read_to_string(cells.join("extruder-feedforward.toml")).unwrap();
-    let with_model = |line: &str| {
-        !["material", "nozzle_mm", "temperature_c"].iter().any(|key| line.starts_with(key))
+    let of_a_library = ["material", "nozzle_mm", "temperature_c"];
+    let by_model = |line: &str| match line {
+        line if line.starts_with("library = ") => Some("model = \"model/model.toml\"".to_owned()),
+        line if of_a_library.iter().any(|key| line.starts_with(key)) => None,
+        line => Some(line.to_owned()),
     };
-    let text: Vec<&str> = text.lines().filter(|line| with_model(line)).collect();
-    let library = "library = \"../models\"           # or model = \"../models/example.toml\"";
-    let text = text.join("\n").replace(library, "model = \"model/model.toml\"");
+    let text = text.lines().filter_map(by_model).collect::<Vec<_>>().join("\n");
     let cell = folder.path().join("feedforward.toml");
     fs::write(&cell, text).unwrap();
     let run = folder.path().join("by-model");
@@ -376,7 +377,7 @@ fn from_a_simulated_run_to_a_cell_with_the_model() {
 #[test]
 fn what_a_recording_cannot_be_asked_for() {
     let folder = tempfile::tempdir().unwrap();
-    let shorter = |text: String| text.replace("path_mm = 6500.0", "path_mm = 1500.0");
+    let shorter = |text: String| text.replace("path_mm = 7000.0", "path_mm = 1500.0");
     let recording = recorded(folder.path(), shorter);
     let recording = recording.to_str().unwrap();
     let ask = |args: &str, code| {

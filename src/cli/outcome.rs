@@ -99,6 +99,15 @@ fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
         }
         Ending::Asked | Ending::TimeOver | Ending::LastFrame => {}
     }
+    let control = report.summary.control.as_ref();
+    if control.is_some_and(|control| control.states_s.keys().all(|state| *state == "idle"))
+        && report.ending == Ending::TimeOver
+    {
+        tell!(
+            "warning: the robot never printed, so that nothing was controlled; start its program"
+        );
+        return ExitCode::from(WITH_LOSS);
+    }
     // A run that somebody ends early may have seen little more than the bead's
     // beginning; that is no loss.
     let share = report.summary.rejected_share();

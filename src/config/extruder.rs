@@ -121,6 +121,13 @@ impl Extruder {
             table.report("robot_follows", "\"flow\"", expected);
         }
         let max_gap = table.number("max_gap_s", 0.01..=60.0);
+        if let Some((gap, rates)) = max_gap.zip(rates)
+            && gap * rates.io_hz < 1.5
+        {
+            let least =
+                format!("at least {:.3}, one and a half periods of io_rate_hz", 1.5 / rates.io_hz);
+            table.report("max_gap_s", gap.to_string(), least);
+        }
         let max_hold = table.number("max_hold_s", 0.1..=3600.0);
         let max_pressure = table.optional_number("max_pressure_mpa", 1e-6..=1e4);
         let link = link::read(table, rates.map(|rates| rates.io_hz));

@@ -2,7 +2,7 @@
 //! it answers.
 
 use super::{Controller, Phase};
-use crate::control::{Event, ExtruderStep};
+use crate::control::{Event, ExtruderStep, Hold};
 use crate::extruder::{ExtruderFault, ExtruderState, FlowDemand, Laying, Supervisor};
 use crate::time::Stamp;
 
@@ -16,7 +16,7 @@ pub(super) struct ExtruderSide {
 impl Controller {
     /// The extruder side's answer to what concerns it.
     pub(super) fn extrude(&mut self, now: Stamp, event: &Event) -> Option<ExtruderStep> {
-        let laying = self.laying();
+        let laying = self.laying(now);
         let ExtruderSide { supervisor, .. } = self.extruder.as_mut()?;
         let command = match event {
             Event::Extruder(report) => {
@@ -39,12 +39,19 @@ impl Controller {
     }
 
     /// What the extruder side has to know of the robot's.
-    fn laying(&self) -> Laying {
+    fn laying(&self, now: Stamp) -> Laying {
         let Some(ExtruderSide { demand, .. }) = &self.extruder else { return Laying::Idle };
         match &self.phase {
             Phase::Idle => Laying::Idle,
             Phase::Fault { .. } => Laying::Stopped,
             _ if self.ended => Laying::Stopped,
+            // Nobody knows what a robot does that is not heard, but by then it has
+            // stopped.
+            Phase::Holding { why: Hold::LinkDown, since }
+                if now - *since > self.setup.alone_for =>
+            {
+                Laying::Stopped
+            }
             Phase::Priming | Phase::Tracking { .. } | Phase::Holding { .. } => {
                 let told = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
                 // No extruder keeps up with a robot that starts; it is ready for

@@ -25,6 +25,7 @@ pub fn setup() -> Setup {
         start_speed: MmPerS::constant(112.5),
         start_length: Mm::constant(200.0),
         camera_offset: Mm::constant(88.4),
+        alone_for: Span::from_millis(1600),
     }
 }
 

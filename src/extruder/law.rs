@@ -65,7 +65,8 @@ impl Wish {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Unusable;
 
-/// What every law can do. None of it allocates.
+/// What every law can do. None of it allocates, but where a bead begins or a hold
+/// ends.
 pub trait Strategy {
     /// The readings that it needs.
     fn needs(&self) -> &'static [Need] {

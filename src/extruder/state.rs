@@ -42,7 +42,8 @@ pub enum ExtruderFault {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ExtruderState {
-    /// No bead is laid; the pump is off and the valve shut.
+    /// No bead is laid; the pump is off, and the valve shut unless it lets too high
+    /// a pressure out.
     #[default]
     Off,
     /// The pump was told to run.

@@ -153,6 +153,7 @@ impl Supervisor {
     pub fn link_went_down(&mut self, now: Stamp) {
         self.link_up = false;
         self.report = None;
+        self.follow.reset();
         self.hold(now, ExtruderHold::LinkDown);
     }
 
@@ -167,7 +168,8 @@ impl Supervisor {
         }
         let command = self.command();
         let stops = self.told.is_some_and(|told| told.pump_on) && !command.pump_on;
-        if !(self.io.due(now) || stops) || !self.link_up {
+        // Nothing is sent on a connection before it is known what the pump does.
+        if !(self.io.due(now) || stops) || !self.link_up || self.report.is_none() {
             return None;
         }
         self.told = Some(command);
@@ -215,11 +217,16 @@ impl Supervisor {
         self.trace.foretold_mm3_per_s = self.setup.law.strategy().foretold();
     }
 
-    /// Stands where the law begins. The first command of a bead is no change
-    /// of another and has no rate.
+    /// Begins a bead. Its first command is no change of another and has no
+    /// rate.
     fn begin(&mut self, now: Stamp, flow: Mm3PerS) {
         self.phase = Phase::Starting { since: now };
         self.begun = now;
+        self.stand(now, flow);
+    }
+
+    /// Stands where the law begins.
+    fn stand(&mut self, now: Stamp, flow: Mm3PerS) {
         let wish = self.setup.law.strategy_mut().begin(now, flow);
         let (low, high) = self.setup.limits.range();
         self.applied = if wish.value.is_finite() {

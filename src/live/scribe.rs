@@ -2,6 +2,7 @@
 //! disk nor the pictures for the report hold control up.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::{Builder, JoinHandle};
 
 use crossbeam_channel::{Receiver, Sender, unbounded};
@@ -27,6 +28,8 @@ enum Fact {
 /// The thread that writes the log.
 pub struct Scribe {
     facts: Sender<Fact>,
+    /// Pictures that have been told and not yet written.
+    waiting: Arc<AtomicUsize>,
     thread: JoinHandle<Result<Summary, LogError>>,
 }
 
@@ -34,8 +37,11 @@ impl Scribe {
     /// Starts to write.
     pub fn start(log: RunLog) -> std::io::Result<Self> {
         let (facts, told) = unbounded();
-        let thread = Builder::new().name("log".to_owned()).spawn(move || write_all(log, &told))?;
-        Ok(Self { facts, thread })
+        let waiting = Arc::new(AtomicUsize::new(0));
+        let pictures = Arc::clone(&waiting);
+        let write = move || write_all(log, &told, &pictures);
+        let thread = Builder::new().name("log".to_owned()).spawn(write)?;
+        Ok(Self { facts, waiting, thread })
     }
 
     /// A frame that was looked at, with its picture and edges.
@@ -44,7 +50,11 @@ impl Scribe {
         row: FrameRow,
         picture: Option<(Arc<Frame>, Vec<ImagePoint>, Vec<ImagePoint>)>,
     ) {
-        let picture = picture.filter(|_| self.facts.len() < WAITING_PICTURES);
+        let room = self.waiting.load(Ordering::Relaxed) < WAITING_PICTURES;
+        let picture = picture.filter(|_| room);
+        if picture.is_some() {
+            self.waiting.fetch_add(1, Ordering::Relaxed);
+        }
         self.tell(Fact::Frame { row, picture });
     }
 
@@ -75,10 +85,15 @@ impl Scribe {
     }
 }
 
-fn write_all(mut log: RunLog, told: &Receiver<Fact>) -> Result<Summary, LogError> {
+fn write_all(
+    mut log: RunLog,
+    told: &Receiver<Fact>,
+    waiting: &AtomicUsize,
+) -> Result<Summary, LogError> {
     for fact in told {
         match fact {
             Fact::Frame { row, picture: Some((frame, left, right)) } => {
+                waiting.fetch_sub(1, Ordering::Relaxed);
                 let edges = Edges { left: &left, right: &right };
                 log.frame(&row, Some(&frame), Some(edges))?;
             }

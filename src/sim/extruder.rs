@@ -148,7 +148,10 @@ impl ExtruderPort for SimExtruder {
         let pump_delay = if command.pump_on { self.delays.start } else { self.delays.stop };
         self.pump.tell(now, command.pump_on, pump_delay);
         self.valve.tell(now, command.valve_open, self.delays.valve);
-        self.value = command.value;
+        // A pump that is told to stop runs down from where it was.
+        if command.pump_on {
+            self.value = command.value;
+        }
         // What needs no time is done at once.
         self.pump.advance(now);
         self.valve.advance(now);
@@ -202,5 +205,17 @@ mod tests {
         assert_eq!(extruder.report().pump, PumpMode::Stopping);
         assert_eq!(flow_at(&mut extruder, 1.21), 0.0);
         assert_eq!(extruder.report().pump, PumpMode::Off);
+    }
+
+    #[test]
+    fn material_flows_until_a_pump_has_stopped() {
+        let mut extruder = extruder();
+        let on = ExtruderCommand { pump_on: true, valve_open: true, value: 5.0 };
+        assert!(extruder.send(Stamp::START, on));
+        extruder.advance(Stamp::from_secs(1.0));
+        let off = ExtruderCommand { pump_on: false, value: 0.0, ..on };
+        assert!(extruder.send(Stamp::from_secs(1.0), off));
+        assert_eq!(flow_at(&mut extruder, 1.19), 50.0);
+        assert_eq!(flow_at(&mut extruder, 1.202), 0.0);
     }
 }

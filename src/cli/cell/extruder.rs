@@ -107,6 +107,14 @@ fn foreseen(
         );
         return Err(wrong(cell, &what).into());
     }
+    let gain = model.transfer.dc_gain();
+    if gain < 0.0 {
+        let what = format!(
+            "found a model with a gain of {gain:.4}, less flow from more {unit}; expected one \
+             above 0: look at the sign of a column"
+        );
+        return Err(wrong(cell, &what).into());
+    }
     let (command, flow_mm3_per_s) = model.operating_point;
     let settings = InverseSettings {
         time_constant_s: keys.time_constant_s,

@@ -18,6 +18,14 @@ pub fn beyond_model(part: &ExtruderPart, side: &ExtruderSide) -> anyhow::Result<
     let command = input + (flow - output) / model.transfer.dc_gain();
     let (low, high) = model.input_range;
     let unit = part.extruder.drive.unit_word();
+    let (min, max) = part.extruder.limits.range();
+    if !(min..=max).contains(&command) {
+        return Ok(Some(format!(
+            "{}: {flow:.1} mm³/s take {command:.4} {unit}, but [extruder] allows {min} to {max} \
+             {unit}; the bead will not have its flow",
+            file.source
+        )));
+    }
     Ok((!(low..=high).contains(&command)).then(|| {
         format!(
             "{}: {flow:.1} mm³/s take {command:.4} {unit}, but it was identified from {low} to \

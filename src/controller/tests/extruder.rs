@@ -126,6 +126,26 @@ fn a_lost_extruder_is_held_while_the_robot_goes_on() {
 }
 
 #[test]
+fn a_pump_does_not_outlast_a_robot_that_nobody_hears() {
+    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    cell.mode = RobotMode::Print;
+    assert_eq!(cell.go(1.0), ExtruderState::Running);
+    let _ = cell.line.give(&Event::LinkDown { reason: "no STATE for 500 ms".into() });
+    let mut state = ExtruderState::Running;
+    for _ in 0..340 {
+        assert!(cell.last().pump_on || cell.line.now > 1.0 + 1.59);
+        let report = cell.report();
+        let _ = cell.line.give(&Event::Extruder(report));
+        let side = cell.line.give(&Event::ExtruderTick).extruder.unwrap();
+        state = side.state;
+        cell.told = side.command.or(cell.told);
+        cell.line.now += TICK_S;
+    }
+    assert_eq!(state, ExtruderState::Off);
+    assert!(!cell.last().pump_on && !cell.last().valve_open);
+}
+
+#[test]
 fn an_extruder_that_stays_away_stops_the_robot_and_is_stopped_when_it_comes_back() {
     let mut cell = Cell::new(Law::Constant(Constant(30.0)));
     cell.mode = RobotMode::Print;

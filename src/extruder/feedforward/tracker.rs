@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::inverse::{InverseSettings, minimum_phase};
 use super::{FeedforwardError, Inverse};
 use crate::model::{StateSpace, TransferFunction};
+use crate::time::Span;
 
 /// Periods of the command in one time constant of the placed poles: with fewer,
 /// the feedback, which is held over a period, swings.
@@ -25,6 +26,7 @@ pub struct Tracker {
     /// State for each unit of a command that stands.
     steady: DVector<f64>,
     gain: f64,
+    period: Span,
     state: DVector<f64>,
     next: DVector<f64>,
 }
@@ -67,9 +69,15 @@ impl Tracker {
             by_demand,
             steady: space.steady()?,
             gain,
+            period: settings.period,
             state: DVector::zeros(order),
             next: DVector::zeros(order),
         })
+    }
+
+    /// Time that [`Self::pass`] goes on by.
+    pub const fn period(&self) -> Span {
+        self.period
     }
 
     /// Output for each unit of a command that stands.

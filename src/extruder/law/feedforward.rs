@@ -7,6 +7,9 @@ use crate::extruder::report::ExtruderReport;
 use crate::time::{Span, Stamp};
 use crate::units::Mm3PerS;
 
+/// Longest time without a tick that is made up for \[s\].
+const MOST_BEHIND_S: f64 = 2.0;
+
 /// Input and output about which a model is linear.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OperatingPoint {
@@ -46,6 +49,8 @@ pub struct Foreseen {
     outlook: Option<Outlook>,
     applied: f64,
     command: f64,
+    /// Time that has passed and that the model has not \[s\].
+    behind_s: f64,
 }
 
 /// The flow that is to come.
@@ -62,7 +67,7 @@ impl Foreseen {
     /// Before its first bead. The tracker takes and gives differences from the
     /// operating point.
     pub const fn new(tracker: Tracker, about: OperatingPoint) -> Self {
-        Self { tracker, about, outlook: None, applied: 0.0, command: 0.0 }
+        Self { tracker, about, outlook: None, applied: 0.0, command: 0.0, behind_s: 0.0 }
     }
 
     /// The same, which also says what will flow. The forecast takes the command
@@ -108,12 +113,15 @@ impl Strategy for Foreseen {
     }
 
     fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> Wish {
-        self.applied = 0.0;
+        (self.applied, self.behind_s) = (0.0, 0.0);
         self.tracker.start(-self.about.command);
         if let Some(outlook) = &mut self.outlook {
             outlook.begin(&self.about);
         }
-        self.aim(flow);
+        // Until the pump runs it is told what a steady flow takes: the model does
+        // not know what it does meanwhile.
+        let off = flow.get() - self.about.flow_mm3_per_s;
+        self.command = self.about.command + off / self.tracker.gain();
         self.wish()
     }
 
@@ -129,10 +137,16 @@ impl Strategy for Foreseen {
         self.aim(flow);
     }
 
-    fn wait(&mut self, _dt: Span) {
-        self.tracker.pass(self.applied - self.about.command);
-        if let Some(outlook) = &mut self.outlook {
-            outlook.pass(self.applied, &self.about);
+    // A tick that came late is made up for, for the model goes by real time.
+    fn wait(&mut self, dt: Span) {
+        let period_s = self.tracker.period().secs();
+        self.behind_s = (self.behind_s + dt.secs()).min(MOST_BEHIND_S);
+        while self.behind_s >= 0.5 * period_s {
+            self.behind_s -= period_s;
+            self.tracker.pass(self.applied - self.about.command);
+            if let Some(outlook) = &mut self.outlook {
+                outlook.pass(self.applied, &self.about);
+            }
         }
     }
 
@@ -301,6 +315,35 @@ mod tests {
             assert!((told - flow).abs() < 5.0, "{told} {flow}");
         }
         assert!(flows[30] < 5.0 && flows[599] > 475.0);
+    }
+
+    #[test]
+    fn ticks_that_are_missed_are_made_up_for() {
+        let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
+        let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
+        let ended = |ticks: i64, count: usize| {
+            let mut law = law(&model, limits, OperatingPoint::default(), 0.25)
+                .foretelling(forecast(&model, Span::ZERO), ForetoldFrom::Command);
+            let _ = law.begin(Stamp::START, Mm3PerS::constant(480.0));
+            law.settle(Stamp::START, 40.0);
+            for _ in 0..count {
+                law.foresee(Span::from_millis(5 * ticks), Mm3PerS::constant(480.0));
+            }
+            (law.wish().value, law.foretold().unwrap().get())
+        };
+        let (whole, missed) = (ended(1, 60), ended(3, 20));
+        assert!((whole.0 - missed.0).abs() < 1e-9 && (whole.1 - missed.1).abs() < 1e-9);
+    }
+
+    #[test]
+    fn until_the_pump_runs_it_is_told_what_a_steady_flow_takes() {
+        let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
+        let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
+        let mut law = law(&model, limits, OperatingPoint::default(), 0.1);
+        assert!((law.begin(Stamp::START, Mm3PerS::constant(480.0)).value - 40.0).abs() < 1e-9);
+        law.settle(Stamp::START, 40.0);
+        law.foresee(PERIOD, Mm3PerS::constant(480.0));
+        assert!(law.wish().value > 100.0, "{}", law.wish().value);
     }
 
     #[test]

@@ -241,3 +241,36 @@ fn a_limit_on_the_pressure_needs_its_reading_and_lets_it_out_until_it_has_fallen
     bench.go(0.1);
     assert!(!bench.last().valve_open);
 }
+
+#[test]
+fn a_pump_that_starts_anew_finds_a_law_that_begins_anew() {
+    let at = |from_s, value| Point { from_s, value };
+    let profile = Profile::new(vec![at(0.0, 20.0), at(0.5, 50.0)], 2.0).unwrap();
+    let mut bench = Bench::new(Law::Profile(Played::new(profile)));
+    bench.report = Some(report(PumpMode::On, 20.0));
+    assert_eq!(bench.go(0.3), ExtruderState::Running);
+    bench.report = Some(report(PumpMode::Starting, 0.0));
+    assert_eq!(bench.go(0.6), ExtruderState::Starting);
+    assert_eq!(bench.sent.last().unwrap().1.value, 20.0);
+    bench.report = Some(report(PumpMode::On, 20.0));
+    assert_eq!(bench.go(0.3), ExtruderState::Running);
+    assert_eq!(bench.sent.last().unwrap().1.value, 20.0);
+}
+
+#[test]
+fn a_valve_that_lets_pressure_out_waits_for_a_report_that_it_has_fallen() {
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    let with = |mpa: Option<f64>| {
+        let pressure_mpa = mpa.map(|mpa| MPa::new(mpa).unwrap());
+        Some(ExtruderReport { pressure_mpa, ..report(PumpMode::On, 30.0) })
+    };
+    let _ = bench.go(0.3);
+    bench.report = with(Some(2.1));
+    assert_eq!(bench.go(0.1), ExtruderState::Fault(ExtruderFault::Overpressure));
+    for (mpa, open) in [(None, true), (Some(1.95), true), (Some(1.8), false)] {
+        bench.report = with(mpa);
+        let _ = bench.go(0.1);
+        let last = bench.sent.last().unwrap().1;
+        assert_eq!((last.pump_on, last.valve_open), (false, open), "{mpa:?}");
+    }
+}

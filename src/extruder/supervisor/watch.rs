@@ -8,29 +8,29 @@ use crate::extruder::report::{ExtruderReport, PumpMode};
 use crate::extruder::state::{ExtruderFault, ExtruderHold};
 use crate::time::Stamp;
 
+/// Share of the highest pressure below which it has fallen.
+const FALLEN: f64 = 0.95;
+
 impl Supervisor {
     /// The extruder reported.
     pub fn reported(&mut self, now: Stamp, report: &ExtruderReport) {
         self.link_up = true;
         self.report = Some((now, *report));
-        let too_high = self.setup.max_pressure.zip(report.pressure_mpa);
-        let too_high = too_high.is_some_and(|(limit, found)| found > limit);
-        self.relieving &= too_high;
+        let too_high = self.relieve(report);
         if self.phase == Phase::Off || matches!(self.phase, Phase::Fault(_)) {
             return;
         }
         if too_high {
-            self.relieving = true;
             self.phase = Phase::Fault(ExtruderFault::Overpressure);
             return;
         }
         match report.pump {
             PumpMode::Fault => self.phase = Phase::Fault(ExtruderFault::Pump),
             PumpMode::On => self.runs(now, report),
-            PumpMode::Starting => self.starts_anew(now),
+            PumpMode::Starting => self.starts_anew(now, now),
             // A report may still tell of the time before the pump was told to run.
             PumpMode::Off | PumpMode::Stopping if now - self.begun <= self.setup.max_gap => {
-                self.starts_anew(self.begun);
+                self.starts_anew(now, self.begun);
             }
             PumpMode::Off | PumpMode::Stopping => {
                 if !matches!(self.phase, Phase::Starting { .. }) {
@@ -40,11 +40,29 @@ impl Supervisor {
         }
     }
 
+    /// Whether the pressure is too high. A valve that was opened for it stays
+    /// open until a report says that it has fallen, whatever the state; only one
+    /// of an extruder that was at work is opened.
+    fn relieve(&mut self, report: &ExtruderReport) -> bool {
+        let Some((limit, found)) = self.setup.max_pressure.zip(report.pressure_mpa) else {
+            return false;
+        };
+        let too_high = found > limit;
+        if too_high && self.phase != Phase::Off {
+            self.relieving = true;
+        } else if found.get() < FALLEN * limit.get() {
+            self.relieving = false;
+        }
+        too_high
+    }
+
     /// The pump says that it is starting: a law that runs would wind up against
-    /// a flow that does not come.
-    fn starts_anew(&mut self, since: Stamp) {
+    /// a flow that does not come, and so it begins once more.
+    fn starts_anew(&mut self, now: Stamp, since: Stamp) {
         if matches!(self.phase, Phase::Running | Phase::Holding { .. }) {
             self.phase = Phase::Starting { since };
+            self.follow.reset();
+            self.stand(now, self.trace.flow_mm3_per_s);
         }
     }
 

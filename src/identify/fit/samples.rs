@@ -4,6 +4,10 @@
 use super::clipped::Clipped;
 use super::settings::Before;
 
+/// Size that no sample reaches; larger ones would overflow where they are
+/// squared and multiplied.
+const LARGEST: f64 = 1e12;
+
 /// What is wrong with the data.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SamplesError {
@@ -24,7 +28,10 @@ pub enum SamplesError {
         needed: usize,
     },
     /// A sample that is no number.
-    #[error("the {what} is {value} at sample {at}; cut the data there or mend it first")]
+    #[error(
+        "the {what} is {value} at sample {at}, which nothing that is measured can be; cut the data \
+         there or mend it first"
+    )]
     NotFinite {
         /// `input` or `output`.
         what: &'static str,
@@ -145,7 +152,7 @@ impl Samples {
 }
 
 fn finite(what: &'static str, row: &[f64]) -> Result<(), SamplesError> {
-    match row.iter().enumerate().find(|(_, value)| !value.is_finite()) {
+    match row.iter().enumerate().find(|(_, value)| !value.is_finite() || value.abs() >= LARGEST) {
         Some((at, value)) => Err(SamplesError::NotFinite { what, value: *value, at }),
         None => Ok(()),
     }

@@ -30,7 +30,7 @@ impl ExtruderWatch {
         self.period
     }
 
-    /// Whether its pump is known to stand, or nothing is known of it.
+    /// Whether its pump neither runs nor starts, or nothing is known of it.
     pub const fn rests(&self) -> bool {
         !matches!(self.pump, Some(PumpMode::On | PumpMode::Starting))
     }
