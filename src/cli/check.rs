@@ -30,6 +30,12 @@ pub struct CheckArgs {
 pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     let loaded = LoadedCell::read(&args.cell, Purpose::Measure)?;
     check_height(&loaded)?;
+    let run = Cell::parse(&args.cell, &loaded.text, Purpose::Run);
+    // Everything that the extruder's strategy refers to, before anything is called
+    // sound.
+    if let Ok(cell) = &run {
+        let _ = LoadedCell { cell: cell.clone(), ..loaded.clone() }.extruder()?;
+    }
     say!("{}: sound", args.cell.display());
     say!("  calibration  {}", loaded.calibration_words());
     if let Calibration::Full { image_size_px: [width, height], .. } = loaded.calibration {
@@ -43,7 +49,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     }
     about_surface(&loaded);
     say!("  suffices for process, render");
-    match Cell::parse(&args.cell, &loaded.text, Purpose::Run) {
+    match run {
         Ok(cell) => {
             let loaded = LoadedCell { cell, ..loaded };
             let Some(run) = &loaded.cell.run else { return Ok(ExitCode::SUCCESS) };

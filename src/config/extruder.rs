@@ -99,10 +99,10 @@ impl Extruder {
     /// Reads `[extruder]`.
     pub fn read(table: &Table<'_>, folder: &Path) -> Option<Self> {
         let drive = table.required_choice("command", &Drive::WORDS);
-        if drive.is_none() {
+        let rates = read_rates(table);
+        if drive.is_none() || rates.is_none() {
             table.pass_over();
         }
-        let rates = read_rates(table);
         let limits = drive.and_then(|drive| read_limits(table, drive));
         let strategy = drive.zip(rates).and_then(|(drive, rates)| {
             let about = About { folder, drive, limits, rates };

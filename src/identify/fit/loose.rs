@@ -35,6 +35,13 @@ pub enum Loose {
         /// A pole and a zero that all but cancel \[1/s\].
         pair: Option<(f64, f64)>,
     },
+    /// The gain at rest does not differ from zero: the output goes its own way.
+    Gain {
+        /// The gain.
+        gain: f64,
+        /// Its standard error; infinite where nothing holds it.
+        sigma: f64,
+    },
     /// Parameters of which one makes up for a change of the others.
     Together {
         /// Their names.
@@ -59,6 +66,12 @@ impl fmt::Display for Loose {
                 )?;
                 cancelling(f, *pair)
             }
+            Self::Gain { gain, sigma } => write!(
+                f,
+                "the data do not tell the gain: {gain:.2e} with a standard error of {sigma:.2e} \
+                 may be none at all. Look whether the output answers the input, and whether \
+                 something else held it (a closed loop does)"
+            ),
             Self::Together { names, pair } => {
                 match names.split_last() {
                     Some((last, others)) if !others.is_empty() => write!(
@@ -98,6 +111,10 @@ pub(super) fn loose(
     if sigma.is_nan() || SEEN_SIGMAS * sigma >= theta[last].abs() {
         let (poles, coefficient) = (problem.poles, theta[last]);
         return Some(Loose::Pole { poles, coefficient, sigma, pair: pair(problem, theta) });
+    }
+    let (gain, sigma) = (theta[0], spread.coloured[(0, 0)].max(0.0).sqrt());
+    if sigma.is_nan() || SEEN_SIGMAS * sigma >= gain.abs() {
+        return Some(Loose::Gain { gain, sigma });
     }
     let direction = spread.loose.as_ref()?;
     let names = together(direction, named, turn);
