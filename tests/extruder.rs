@@ -358,3 +358,22 @@ fn a_simulation_that_is_ended_leaves_what_it_has() {
     names.sort();
     assert_eq!(names, ["recording.mcap", "report.html", "summary.json", "widths.csv"]);
 }
+
+#[test]
+fn a_bad_rate_is_told_alone() {
+    let (status, said, _) =
+        simulated(&[("layer_height_mm", "control_rate_hz = 1e6\nlayer_height_mm")]);
+    assert_eq!(status, Some(2));
+    assert!(said.contains("control_rate_hz") && !said.contains("unknown"), "{said}");
+}
+
+#[test]
+fn check_calls_no_cell_sound_whose_model_is_not_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let cell = include_str!("../cells/extruder-feedforward.toml");
+    fs::write(folder.path().join("cell.toml"), cell.replace("../models", "nowhere")).unwrap();
+    let output = truebead(folder.path(), &["check", "cell.toml"]);
+    assert_eq!(output.status.code(), Some(2));
+    let answer = String::from_utf8(output.stdout).unwrap();
+    assert!(!answer.contains("sound"), "{answer}");
+}
