@@ -45,7 +45,8 @@ impl Cycle {
     }
 }
 
-#[divan::bench(args = [Tried::Pi, Tried::Vsfc, Tried::SmithPi, Tried::Predictive])]
+// One cycle is too short for the clock alone: a sample is the mean of many.
+#[divan::bench(sample_size = 400, args = [Tried::Pi, Tried::Vsfc, Tried::SmithPi, Tried::Predictive])]
 fn cycle(bencher: Bencher<'_, '_>, tried: Tried) {
     let mut cycle = Cycle::new(tried);
     bencher.bench_local(|| cycle.run());

@@ -4,7 +4,7 @@
 //! estimation, Magill 1965).
 
 use super::Fopdt;
-use super::belief::{Belief, Filter, GAIN, LAG, LOAD, State};
+use super::belief::{Belief, Filter, GAIN, LAG, LOAD, Left, State};
 use super::history::{CommandHistory, Lags};
 use super::jump::Watch;
 use super::tuning::Tuning;
@@ -90,13 +90,15 @@ impl Bank {
     pub fn read(&mut self, history: &CommandHistory, at_s: f64, dt_s: f64, reading: f64) {
         let filter = self.filter;
         let moving = MOVING * filter.tuning.sigma();
+        let [resting, going] = Left::after(&filter, dt_s);
         let mut seen = self.beliefs.map(|belief| (belief.weight, None));
         for (belief, seen) in self.beliefs.iter_mut().zip(&mut seen) {
             let then_s = at_s - belief.dead_time_s;
             let then = history.at(then_s);
-            belief.pass(&filter, dt_s, (then.drive - then.lags.first).abs() > moving);
+            let moves = (then.drive - then.lags.first).abs() > moving;
+            belief.pass(&filter, if moves { &going } else { &resting });
             let aside = belief.dead_sigma_s(&filter);
-            let around = [then_s - aside, then_s + aside].map(|at_s| history.at(at_s).drive);
+            let around = [then_s - aside, then_s + aside].map(|at_s| history.drive_at(at_s));
             let innovation = belief.read(&filter, reading, &then, around);
             if belief.is_lost() {
                 let load = reading - then.lags.first;

@@ -52,6 +52,28 @@ impl Filter {
     }
 }
 
+/// What some time leaves of a belief. What is known of the model fades only
+/// while the pressure moves: at rest there would be nothing to learn it anew
+/// from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Left {
+    /// Share of the load's way that is still to go.
+    load: f64,
+    /// Share of what is known of the model's errors.
+    known: f64,
+    /// Variance that the load has gained \[MPa²\].
+    wandered: f64,
+}
+
+impl Left {
+    /// After `dt_s` at rest, and after the same while the pressure moves.
+    pub fn after(filter: &Filter, dt_s: f64) -> [Self; 2] {
+        let load = libm::exp(-dt_s / filter.lag_s);
+        let wandered = filter.tuning.wander * dt_s;
+        [1.0, libm::exp(-dt_s / filter.tuning.forget_s)].map(|known| Self { load, known, wandered })
+    }
+}
+
 /// An innovation and its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Innovation {
@@ -89,22 +111,31 @@ impl Belief {
         Self { dead_time_s, weight, state, covariance }
     }
 
-    /// Lets time pass. What is known of the model fades only while the
-    /// pressure moves: at rest there would be nothing to learn it anew from.
-    pub fn pass(&mut self, filter: &Filter, dt_s: f64, moves: bool) {
-        let kept = libm::exp(-dt_s / filter.lag_s);
-        let known = if moves { libm::exp(-dt_s / filter.tuning.forget_s) } else { 1.0 };
-        let mut step = Covariance::identity();
-        step[(LOAD_NOW, LOAD_NOW)] = kept;
-        step[(LOAD_NOW, LOAD)] = 1.0 - kept;
+    /// Lets time pass, by what it leaves.
+    pub fn pass(&mut self, filter: &Filter, left: &Left) {
+        let toward = |now: f64, settled: f64| left.load * now + (1.0 - left.load) * settled;
+        let (state, covariance) = (&mut self.state, &mut self.covariance);
+        state[LOAD_NOW] = toward(state[LOAD_NOW], state[LOAD]);
         for place in [GAIN, LAG, DEAD] {
-            step[(place, place)] = known;
+            state[place] *= left.known;
         }
-        self.state = step * self.state;
-        self.covariance = step * self.covariance * step.transpose();
-        self.covariance[(LOAD, LOAD)] += filter.tuning.wander * dt_s;
+        // The step's matrix from the left and its transpose from the right: it
+        // mixes the two loads and shrinks the rest.
+        for i in 0..5 {
+            covariance[(LOAD_NOW, i)] = toward(covariance[(LOAD_NOW, i)], covariance[(LOAD, i)]);
+        }
+        for i in 0..5 {
+            covariance[(i, LOAD_NOW)] = toward(covariance[(i, LOAD_NOW)], covariance[(i, LOAD)]);
+        }
         for place in [GAIN, LAG, DEAD] {
-            self.covariance[(place, place)] += (1.0 - known * known) * filter.prior(place);
+            for i in 0..5 {
+                covariance[(place, i)] *= left.known;
+                covariance[(i, place)] *= left.known;
+            }
+        }
+        covariance[(LOAD, LOAD)] += left.wandered;
+        for place in [GAIN, LAG, DEAD] {
+            covariance[(place, place)] += (1.0 - left.known * left.known) * filter.prior(place);
         }
     }
 
@@ -126,8 +157,9 @@ impl Belief {
         let along = self.covariance * row;
         let variance = noise + row.dot(&along).max(0.0);
         let difference = reading - first - row.dot(&self.state);
-        self.state += along * (difference / variance);
-        self.covariance -= along * along.transpose() / variance;
+        let gain = along * (1.0 / variance);
+        self.state += gain * difference;
+        self.covariance -= gain * along.transpose();
         // Rounding must not turn the covariances about.
         self.covariance = (self.covariance + self.covariance.transpose()) * 0.5;
         Innovation { difference, variance }

@@ -2,6 +2,8 @@
 //! holds until the next, so the lag is known in closed form at any moment, and
 //! a dead time is a moment further back. It need be no multiple of any step.
 
+use std::collections::VecDeque;
+
 use super::Fopdt;
 
 /// Commands a second that are kept over the longest delay that is asked for.
@@ -49,9 +51,10 @@ pub struct Moment {
 pub struct CommandHistory {
     gain: f64,
     lag_s: f64,
-    /// A ring; the newest is at `newest`.
-    ring: Vec<Entry>,
-    newest: usize,
+    /// The oldest first; never empty.
+    entries: VecDeque<Entry>,
+    /// How many are kept.
+    most: usize,
 }
 
 impl CommandHistory {
@@ -65,48 +68,51 @@ impl CommandHistory {
     pub fn new(model: &Fopdt, back_s: f64, speed_rpm: f64) -> Self {
         let drive = model.gain() * speed_rpm;
         let lags = Lags { first: drive, second: drive };
-        let entry = Entry { at_s: f64::NEG_INFINITY, drive, lags };
-        let kept = (back_s.clamp(0.0, 1e3) * HZ).ceil() as usize + 2;
-        Self { gain: model.gain(), lag_s: model.lag_s(), ring: vec![entry; kept], newest: 0 }
+        let most = (back_s.clamp(0.0, 1e3) * HZ).ceil() as usize + 2;
+        let mut entries = VecDeque::with_capacity(most);
+        entries.push_back(Entry { at_s: f64::NEG_INFINITY, drive, lags });
+        Self { gain: model.gain(), lag_s: model.lag_s(), entries, most }
     }
 
     /// A command from `at_s` on; not before the last one.
     pub fn push(&mut self, at_s: f64, speed_rpm: f64) {
         let drive = self.gain * speed_rpm;
-        let last = self.entry(0);
-        if drive == last.drive || at_s < last.at_s {
+        let last = self.entries.back();
+        if last.is_some_and(|last| drive == last.drive || at_s < last.at_s) {
             return;
         }
-        let lags = self.at(at_s).lags;
-        if at_s > last.at_s {
-            self.newest = (self.newest + 1) % self.ring.len();
-        }
-        let newest = self.newest;
-        if let Some(entry) = self.ring.get_mut(newest) {
-            *entry = Entry { at_s, drive, lags };
+        let entry = Entry { at_s, drive, lags: self.at(at_s).lags };
+        match self.entries.back_mut() {
+            Some(last) if last.at_s == at_s => *last = entry,
+            _ => {
+                if self.entries.len() >= self.most {
+                    self.entries.pop_front();
+                }
+                self.entries.push_back(entry);
+            }
         }
     }
 
     /// What holds at a moment. Before all that is kept, the earliest.
     pub fn at(&self, at_s: f64) -> Moment {
-        let mut age = 0;
-        // The command in force just before: one that begins now does not count.
-        while age + 1 < self.ring.len() && self.entry(age).at_s >= at_s {
-            age += 1;
-        }
-        let entry = self.entry(age);
+        let entry = self.in_force(at_s);
         let dt_s = if entry.at_s.is_finite() { at_s - entry.at_s } else { 0.0 };
         Moment { drive: entry.drive, lags: entry.lags.after(entry.drive, dt_s, self.lag_s) }
     }
 
-    /// The entry that many places before the newest.
-    fn entry(&self, age: usize) -> Entry {
-        let kept = self.ring.len();
-        let at = (self.newest + kept - age % kept) % kept;
-        self.ring.get(at).copied().unwrap_or(Entry {
+    /// Gain times the command that was in force just before a moment \[MPa\].
+    pub fn drive_at(&self, at_s: f64) -> f64 {
+        self.in_force(at_s).drive
+    }
+
+    /// The command in force just before: one that begins now does not count.
+    fn in_force(&self, at_s: f64) -> Entry {
+        let later = self.entries.partition_point(|entry| entry.at_s < at_s);
+        let nothing = Lags { first: 0.0, second: 0.0 };
+        self.entries.get(later.saturating_sub(1)).copied().unwrap_or(Entry {
             at_s: f64::NEG_INFINITY,
             drive: 0.0,
-            lags: Lags { first: 0.0, second: 0.0 },
+            lags: nothing,
         })
     }
 }

@@ -7,6 +7,10 @@ use super::belief::Innovation;
 /// Innovations that are looked back over.
 const WINDOW: usize = 16;
 
+/// Nothing is told apart from a step that has grown to all but this; powers of
+/// it over the window stay within the numbers.
+const LEAST: f64 = 1e-6;
+
 /// A step of the load.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jump {
@@ -49,7 +53,8 @@ impl Watch {
     /// one it begins anew.
     pub fn see(&mut self, innovation: Innovation, dt_s: f64) -> Option<Jump> {
         self.seen.rotate_right(1);
-        self.seen[0] = Seen { innovation, kept: libm::exp(-dt_s / self.lag_s) };
+        let kept = libm::exp(-dt_s / self.lag_s).max(LEAST);
+        self.seen[0] = Seen { innovation, kept };
         self.count = (self.count + 1).min(WINDOW);
         let jump = self.likeliest();
         if jump.is_some() {
@@ -58,26 +63,30 @@ impl Watch {
         jump
     }
 
+    /// Goes back through the innovations. What a step had grown to at each of
+    /// them is 1 − left/passed, `passed` being what the time between it and
+    /// the newest leaves, so that sums over `passed` serve every beginning.
     fn likeliest(&self) -> Option<Jump> {
         let mut best = (self.evidence, None);
-        for first in 1..self.count {
-            let (ratio, jump) = self.of_step_at(first);
-            if ratio > best.0 {
-                best = (ratio, Some(jump));
+        let (mut passed, mut sums) = (1.0, Sums::default());
+        for (back, seen) in self.seen.iter().take(self.count).enumerate() {
+            sums.add(seen.innovation, passed);
+            if back > 0 {
+                let (ratio, jump) = self.of_step(&sums, passed * seen.kept.sqrt());
+                if ratio > best.0 {
+                    best = (ratio, Some(jump));
+                }
             }
+            passed *= seen.kept;
         }
         best.1
     }
 
-    /// A step that began half an interval before the innovation at `first`.
-    fn of_step_at(&self, first: usize) -> (f64, Jump) {
-        let (mut with, mut power, mut left) = (0.0, 0.0, 1.0);
-        for (index, seen) in self.seen.iter().take(first + 1).rev().enumerate() {
-            left *= if index == 0 { seen.kept.sqrt() } else { seen.kept };
-            let grown = 1.0 - left;
-            with += grown * seen.innovation.difference / seen.innovation.variance;
-            power += grown * grown / seen.innovation.variance;
-        }
+    /// A step that began half an interval before the last innovation of the
+    /// sums and of which the share `left` is still to come.
+    fn of_step(&self, sums: &Sums, left: f64) -> (f64, Jump) {
+        let with = sums.difference[0] - left * sums.difference[1];
+        let power = sums.weight[0] - 2.0 * left * sums.weight[1] + left * left * sums.weight[2];
         if power <= 0.0 {
             let settled = 0.0;
             return (f64::NEG_INFINITY, Jump { settled, grown: 0.0, variance: 0.0 });
@@ -87,6 +96,26 @@ impl Watch {
         let ratio = 0.5 * with * with / power * share - 0.5 * libm::log(1.0 + prior * power);
         let settled = share * with / power;
         (ratio, Jump { settled, grown: 1.0 - left, variance: share / power })
+    }
+}
+
+/// Sums over innovations, by their variances and over powers of what the time
+/// since each has left.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    difference: [f64; 2],
+    weight: [f64; 3],
+}
+
+impl Sums {
+    fn add(&mut self, innovation: Innovation, passed: f64) {
+        let weight = 1.0 / innovation.variance;
+        let grown = weight / passed;
+        self.difference[0] += innovation.difference * weight;
+        self.difference[1] += innovation.difference * grown;
+        self.weight[0] += weight;
+        self.weight[1] += grown;
+        self.weight[2] += grown / passed;
     }
 }
 
@@ -131,5 +160,40 @@ mod tests {
         let found: u32 = (0..20).map(|seed| watch(0.0, 100 + seed, 3000).0).sum();
         // 20 minutes.
         assert!(found < 80, "{found}");
+    }
+
+    /// The ratio written out: a step that began half an interval before the
+    /// innovation at `first` would show as `grown` at each one since.
+    fn written_out(watch: &Watch, first: usize) -> f64 {
+        let (mut with, mut power, mut left) = (0.0, 0.0, 1.0);
+        for (index, seen) in watch.seen.iter().take(first + 1).rev().enumerate() {
+            left *= if index == 0 { seen.kept.sqrt() } else { seen.kept };
+            let grown = 1.0 - left;
+            with += grown * seen.innovation.difference / seen.innovation.variance;
+            power += grown * grown / seen.innovation.variance;
+        }
+        let prior = watch.load * watch.load;
+        0.5 * with * with / power * prior / (prior + 1.0 / power)
+            - 0.5 * f64::ln(1.0 + prior * power)
+    }
+
+    #[test]
+    fn the_sums_come_to_the_ratio_written_out() {
+        for gap in [1e-3, 0.02, 0.3, 40.0, 1e4] {
+            // Never taken for real, so that nothing begins anew.
+            let mut watch = Watch::new(0.84, 0.06, f64::INFINITY);
+            for i in 0..40 {
+                let [a, b] = normal_pair(mix(&[7, i]));
+                let variance = SIGMA * SIGMA * (1.0 + b.abs());
+                let dt = if i == 30 { gap } else { 0.02 };
+                watch.see(Innovation { difference: SIGMA * a, variance }, dt);
+            }
+            let expected = (1..WINDOW).map(|first| written_out(&watch, first));
+            let best = expected.fold(f64::NEG_INFINITY, f64::max);
+            watch.evidence = best - 1e-9;
+            assert!(watch.likeliest().is_some(), "{gap}");
+            watch.evidence = best + 1e-9;
+            assert!(watch.likeliest().is_none(), "{gap}");
+        }
     }
 }
