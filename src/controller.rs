@@ -167,6 +167,7 @@ impl Controller {
             | Event::Extruder(_)
             | Event::ExtruderUp
             | Event::ExtruderDown { .. }
+            | Event::ExtruderRefused { .. }
             | Event::ExtruderTick => None,
             Event::Tick => self.tick(now, &mut trace),
             Event::CameraLost { .. } => {

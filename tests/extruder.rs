@@ -151,6 +151,54 @@ fn a_profile_is_played_and_a_bad_one_has_its_line() {
 }
 
 #[test]
+fn a_profile_that_changes_faster_than_the_limits_allow_is_warned_of() {
+    let cell = include_str!("../cells/extruder-excite.toml");
+    let rate = cell.lines().find(|line| line.starts_with("max_rpm_per_s")).unwrap();
+    let (status, said, _) = simulated_cell(cell, &[]);
+    assert!(status == Some(0) && !said.contains("warning"), "{said}");
+    let (_, said, _) = simulated_cell(cell, &[(rate, "max_rpm_per_s = 5.0")]);
+    assert!(said.contains("are not made to their end"), "{said}");
+}
+
+#[test]
+fn readings_are_filtered_before_the_strategy_goes_by_them() {
+    let cell = include_str!("../cells/extruder-adaptive.toml");
+    let with = |readings: &str| {
+        let table = format!("[extruder.readings]\n{readings}\n[extruder_plant]");
+        simulated_cell(cell, &[("[extruder_plant]", &table)])
+    };
+    let filters = "spike_half_width = 2\nsmooth_window = 9";
+    let (status, said, summary) = with(filters);
+    assert_eq!(status, Some(0), "{said}");
+    assert!(off(&summary).abs() < 0.03, "{summary}");
+    for (wrong, told) in [
+        ("", "extruder.readings.spike_half_width"),
+        ("smooth_window = 8", "expected an odd number"),
+        ("spike_half_width = 0", "extruder.readings.spike_half_width"),
+        ("smooth_windw = 9\nspike_half_width = 2", "smooth_windw"),
+    ] {
+        let (status, said, _) = with(wrong);
+        assert_eq!(status, Some(2), "{said}");
+        assert!(said.contains(told), "{told}: {said}");
+    }
+}
+
+#[test]
+fn a_simulation_leaves_no_recording_of_another_beside_its_results() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("cell.toml"), CELL).unwrap();
+    let first = truebead(folder.path(), &["simulate", "cell.toml", "--out", "out", "--record"]);
+    assert_eq!(first.status.code(), Some(0), "{first:?}");
+    for more in [&[][..], &["--record"]] {
+        let args = [&["simulate", "cell.toml", "--out", "out"], more].concat();
+        let again = truebead(folder.path(), &args);
+        assert_eq!(again.status.code(), Some(2), "{again:?}");
+        let said = String::from_utf8(again.stderr).unwrap();
+        assert!(said.contains("recording.mcap is there already"), "{said}");
+    }
+}
+
+#[test]
 fn a_plant_that_never_reports_what_is_gone_by_is_refused() {
     for (from, to, told) in [
         (

@@ -3,7 +3,7 @@
 pub mod extruder;
 mod range;
 
-pub use range::beyond_model;
+pub use range::beyond;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -104,8 +104,8 @@ impl LoadedCell {
         let Some(part) = part else { return Ok(None) };
         let plant = self.plant(part)?;
         let Some(side) = self.extruder()? else { return Ok(None) };
-        if let Some(beyond) = beyond_model(part, &side)? {
-            tell!("warning: {beyond}");
+        if let Some(words) = beyond(part, &side)? {
+            tell!("warning: {words}");
         }
         let (demand, nominal_flow) = (part.demand, part.plant_nominal);
         Ok(Some(Rig { setup: side.setup, demand, plant, nominal_flow }))

@@ -7,7 +7,7 @@ use clap::Args;
 use nalgebra::Point3;
 
 use super::WrongArguments;
-use super::cell::{LoadedCell, beyond_model};
+use super::cell::{LoadedCell, beyond};
 use crate::calib::Calibration;
 use crate::config::Cell;
 use crate::config::cell::{Purpose, RunPart, Source};
@@ -164,9 +164,9 @@ fn about_extruder(loaded: &LoadedCell) -> anyhow::Result<()> {
         part.demand.nominal().get()
     );
     if let Some(side) = loaded.extruder()?
-        && let Some(beyond) = beyond_model(part, &side)?
+        && let Some(words) = beyond(part, &side)?
     {
-        say!("  WARNING      {beyond}");
+        say!("  WARNING      {words}");
     }
     if part.plant.is_some() {
         let _ = loaded.plant(part)?;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use super::WITH_LOSS;
+use super::{WITH_LOSS, WrongArguments};
 use crate::live::{Ending, LiveReport};
 use crate::offline::{Summary, names};
 
@@ -19,6 +19,19 @@ pub fn free_folder(name: &str) -> PathBuf {
         .map(|n| PathBuf::from(format!("{name}-{n}")))
         .find(|path| !taken(path))
         .unwrap_or(first)
+}
+
+/// Refuses a folder that holds a recording: what is about to be written there
+/// would replace it, or stand beside one that it does not belong to.
+pub fn refuse_a_recording_in(folder: &Path) -> Result<(), WrongArguments> {
+    let names = ["recording.mcap", "recording.mcap.partial"];
+    match names.map(|name| folder.join(name)).into_iter().find(|file| file.exists()) {
+        Some(found) => Err(WrongArguments::new(format!(
+            "{} is there already, of another run; name another folder with --out",
+            found.display()
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// Prints the figures of a run to standard output, and gives its status.

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::Args;
 
-use super::cell::{LoadedCell, beyond_model};
+use super::cell::{LoadedCell, beyond};
 use super::{Voice, WrongArguments, outcome};
 use crate::config::cell::{Purpose, RunPart};
 use crate::io::clock::RunClock;
@@ -63,15 +63,7 @@ pub fn drive(
     clock: RunClock,
     voice: Voice,
 ) -> anyhow::Result<ExitCode> {
-    for name in ["recording.mcap", "recording.mcap.partial"] {
-        if out.join(name).exists() {
-            let found = out.join(name).display().to_string();
-            return Err(WrongArguments::new(format!(
-                "{found} is there already and would be lost; name another folder with --out"
-            ))
-            .into());
-        }
-    }
+    outcome::refuse_a_recording_in(out)?;
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
     let (extruder, extruder_file) = live_extruder(&loaded, &run)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
@@ -146,8 +138,8 @@ fn live_extruder(
         ))
         .into());
     };
-    if let Some(beyond) = beyond_model(part, &side)? {
-        tell!("warning: {beyond}");
+    if let Some(words) = beyond(part, &side)? {
+        tell!("warning: {words}");
     }
     Ok((Some(LiveExtruder { setup: side.setup, demand: part.demand, link }), side.file))
 }

@@ -32,8 +32,9 @@ The scenario is a cell file; [bead], [render] and [simulation] say what is
 simulated. One bead of [simulation] path_mm is laid. level = \"frames\" renders
 and measures every frame; level = \"widths\" takes the true width with noise and
 is thousands of times faster than the clock. Ctrl-C ends it with what there is by
-then. Leaves widths.csv, summary.json and report.html; with --record also recording.mcap, which identify and viewers of
-MCAP read.")]
+then. Leaves widths.csv, summary.json and report.html; with --record also
+recording.mcap, which identify and viewers of MCAP read. A folder that holds a
+recording of another run is refused.")]
 pub struct SimulateArgs {
     /// Cell file that describes cell, bead and world
     scenario: PathBuf,
@@ -50,6 +51,7 @@ pub struct SimulateArgs {
 
 /// Runs the command.
 pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
+    outcome::refuse_a_recording_in(&args.out)?;
     let mut loaded = LoadedCell::read(&args.scenario, Purpose::Run)?;
     if let Some(seed) = args.seed {
         loaded.cell.simulation.seed = seed;
@@ -89,7 +91,7 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     let summary = logger.log.finish()?;
     outcome::figures(&summary);
     say!(
-        "time       {:.1} s simulated in {took_s:.3} s, {:.0} times as fast, the log included",
+        "time       {:.1} s simulated in {took_s:.3} s, {:.0} times as fast, its files written meanwhile",
         end.took.secs(),
         end.took.secs() / took_s.max(1e-9)
     );

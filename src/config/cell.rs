@@ -10,6 +10,7 @@ mod robot;
 use std::path::Path;
 
 use super::control::{self, Control};
+use super::extruder::Beside;
 use super::rendered::{self, Simulation};
 use crate::calib::{Calibration, SurfaceMap};
 use crate::control::limiter::Limits;
@@ -20,6 +21,7 @@ use crate::units::Mm;
 use crate::vision::Gauge;
 
 pub use super::extruder::ExtruderPart;
+
 pub use calibration::CalibrationSource;
 pub use camera::{Camera, Mount, Source};
 pub use robot::Robot;
@@ -147,7 +149,12 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let simulation = rendered::read(root);
     let speed = robot.as_ref().map(|robot| robot.start_speed);
     let bead = target.zip(speed);
-    let extruder = ExtruderPart::read(root, folder, bead, simulation.as_ref());
+    let beside = Beside {
+        bead,
+        robot_address: robot.as_ref().map(|robot| robot.address.as_str()),
+        simulation: simulation.as_ref(),
+    };
+    let extruder = ExtruderPart::read(root, folder, &beside);
     let run = match (control, limits, camera, robot) {
         (Some(control), Some(limits), Some(camera), Some(robot)) => {
             Some(RunPart { control, limits, camera, robot, extruder })

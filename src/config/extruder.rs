@@ -7,20 +7,21 @@ mod link;
 mod part;
 mod plant;
 mod pressure;
+mod readings;
 mod screw;
 mod strategy;
 
 use std::path::Path;
 
 pub use link::ExtruderLink;
-pub use part::ExtruderPart;
+pub use part::{Beside, ExtruderPart};
 pub use plant::{ExtruderPlant, LinearPlant, PlantKind, PressurePlant, ScrewPlant};
 pub use strategy::{FeedforwardKeys, ModelSource, Strategy};
 
 use crate::document::Table;
 use crate::extruder::demand::section;
 use crate::extruder::{
-    CommandLimits, Drive, ExtruderSetup, FlowDemand, Follows, Law, RobotFollows,
+    CommandLimits, Drive, ExtruderSetup, FlowDemand, Follows, Law, ReadingFilters, RobotFollows,
 };
 use crate::time::Span;
 use crate::units::{MPa, Mm, MmPerS};
@@ -51,6 +52,8 @@ pub struct Extruder {
     pub max_hold: Span,
     /// Pressure at which the pump is stopped, if the file says so.
     pub max_pressure: Option<MPa>,
+    /// What readings pass before the strategy sees them.
+    pub filters: ReadingFilters,
     /// How a live run reaches it, if the file says so.
     pub link: Option<ExtruderLink>,
 }
@@ -129,7 +132,13 @@ impl Extruder {
             table.report("max_gap_s", gap.to_string(), least);
         }
         let max_hold = table.number("max_hold_s", 0.1..=3600.0);
+        if let Some((gap, hold)) = max_gap.zip(max_hold)
+            && gap > hold
+        {
+            table.report("max_gap_s", gap.to_string(), format!("at most max_hold_s = {hold}"));
+        }
         let max_pressure = table.optional_number("max_pressure_mpa", 1e-6..=1e4);
+        let filters = readings::read(table);
         let link = link::read(table, rates.map(|rates| rates.io_hz));
         Some(Self {
             drive: drive?,
@@ -142,6 +151,7 @@ impl Extruder {
             max_gap: Span::from_secs(max_gap?),
             max_hold: Span::from_secs(max_hold?),
             max_pressure: max_pressure.and_then(|pressure| MPa::new(pressure).ok()),
+            filters: filters?,
             link,
         })
     }
@@ -172,6 +182,7 @@ impl Extruder {
             max_gap: self.max_gap,
             max_hold: self.max_hold,
             max_pressure: self.max_pressure,
+            filters: self.filters,
             robot_follows: self.robot_follows,
         }
     }

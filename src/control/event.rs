@@ -61,6 +61,13 @@ pub enum Event {
         /// Why, in words for the operator.
         reason: String,
     },
+    /// The extruder refused a line.
+    ExtruderRefused {
+        /// Number of the command that was refused.
+        seq: u64,
+        /// `STALE`, `RANGE`, `SEQUENCE`, `MODE` or `FORM`.
+        code: String,
+    },
     /// It is time for a step of the extruder's feedforward.
     ExtruderTick,
     /// The camera gives no more frames.

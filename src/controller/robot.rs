@@ -45,6 +45,8 @@ impl Controller {
 
     fn printing(&mut self, now: Stamp, state: &RobotState, before: Option<RobotState>) {
         let fresh = before.is_some_and(|last| state.path_mm < last.path_mm);
+        // The extruder's law goes on over a new bead whose robot was not seen
+        // idle: its pump never stood, and what the law knows of it still holds.
         if fresh {
             self.become_idle();
         }

@@ -28,8 +28,12 @@ pub enum ExtruderHold {
 pub enum ExtruderFault {
     /// Held for longer than the cell allows, for this reason.
     HeldTooLong(ExtruderHold),
+    /// A bead began, and no extruder reports.
+    NoAnswer,
     /// The pump was told to run and did not.
     DidNotStart,
+    /// The pump was told to stop and runs on. Left when it rests.
+    RunsOn,
     /// The pump stopped by itself, or reports a fault.
     Pump,
     /// The pressure at the nozzle rose above what the cell allows.
@@ -52,7 +56,8 @@ pub enum ExtruderState {
     Running,
     /// The last command is kept.
     Holding(ExtruderHold),
-    /// The pump was told to stop. Left when the robot is idle again.
+    /// The pump was told to stop. Left when the robot is idle again, unless the
+    /// fault says more.
     Fault(ExtruderFault),
 }
 

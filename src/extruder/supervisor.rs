@@ -7,13 +7,15 @@
 //! - running: the law commands, within its limits.
 //! - holding: the last command is kept, for a reason; left when the reason
 //!   goes, and a fault when it stays too long.
-//! - fault: the pump is stopped; left when the robot is idle again.
+//! - fault: the pump is stopped; left when the robot is idle again, and where
+//!   the pump runs on all the same, not before it rests.
 
 mod watch;
 
 use super::law::{Law, Wish};
 use super::limits::{CommandLimit, CommandLimits};
 use super::rates::Rate;
+use super::readings::{ReadingFilters, Readings};
 use super::report::{ExtruderCommand, ExtruderReport};
 use super::state::{ExtruderFault, ExtruderHold, ExtruderState, ExtruderTrace};
 use super::{Drive, RobotFollows};
@@ -45,6 +47,8 @@ pub struct ExtruderSetup {
     pub max_hold: Span,
     /// Pressure at which the pump is stopped, if there is one.
     pub max_pressure: Option<MPa>,
+    /// What readings pass before the law sees them.
+    pub filters: ReadingFilters,
     /// What the robot's speed goes by besides the width.
     pub robot_follows: RobotFollows,
 }
@@ -75,7 +79,9 @@ pub struct Supervisor {
     setup: ExtruderSetup,
     phase: Phase,
     link_up: bool,
+    /// The last one, as the law sees it.
     report: Option<(Stamp, ExtruderReport)>,
+    readings: Readings,
     follow: Follow,
     io: Rate,
     control: Rate,
@@ -84,6 +90,11 @@ pub struct Supervisor {
     applied: f64,
     /// When the bead began.
     begun: Stamp,
+    /// When the last report came, on whatever connection.
+    heard: Option<Stamp>,
+    /// Since when reports have said that the pump runs although it was told to
+    /// rest.
+    runs_on: Option<Stamp>,
     /// Whether the last report can be true.
     usable: bool,
     /// Whether the valve stays open to let too high a pressure out.
@@ -100,6 +111,7 @@ impl Supervisor {
             io: Rate::every(setup.io_period),
             control: Rate::every(setup.control_period),
             applied: setup.limits.idle(),
+            readings: Readings::new(setup.filters),
             setup,
             phase: Phase::Off,
             link_up: false,
@@ -108,6 +120,8 @@ impl Supervisor {
             ticked: None,
             controlled: None,
             begun: Stamp::START,
+            heard: None,
+            runs_on: None,
             usable: true,
             relieving: false,
             told: None,
@@ -153,6 +167,8 @@ impl Supervisor {
     pub fn link_went_down(&mut self, now: Stamp) {
         self.link_up = false;
         self.report = None;
+        self.readings.forget();
+        self.runs_on = None;
         self.follow.reset();
         self.hold(now, ExtruderHold::LinkDown);
     }
@@ -164,6 +180,7 @@ impl Supervisor {
         match laying {
             Laying::Bead(flow) => self.lay(now, dt, flow),
             Laying::Stopped if matches!(self.phase, Phase::Fault(_)) => {}
+            Laying::Idle if self.phase == Phase::Fault(ExtruderFault::RunsOn) => {}
             Laying::Stopped | Laying::Idle => self.rest(),
         }
         let command = self.command();

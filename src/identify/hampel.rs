@@ -92,7 +92,7 @@ impl Hampel {
 
 /// The same for live use: the window is the newest 2K + 1 samples, of which the
 /// last one is judged. A change of level passes K samples late.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LiveHampel {
     filter: Hampel,
     ring: Vec<f64>,

@@ -142,7 +142,7 @@ impl SavGol {
 /// The same for live use: the polynomial through the newest samples, at the
 /// last of them. It is noisier than in the middle, by
 /// [`SavGol::noise_gain`], and comes without delay for what is a polynomial.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LiveSavGol {
     coefficients: Vec<f64>,
     ring: Vec<f64>,

@@ -73,6 +73,8 @@ pub struct RunLog {
     charts: Charts,
     pictures: FramePicker,
     remarks: Vec<String>,
+    /// Reasons for which the extruder refused lines.
+    refused: Vec<String>,
 }
 
 impl RunLog {
@@ -87,6 +89,7 @@ impl RunLog {
             charts: Charts::default(),
             pictures: FramePicker::new(options.gauge),
             remarks: Vec::new(),
+            refused: Vec::new(),
             options,
         })
     }
@@ -122,6 +125,15 @@ impl RunLog {
             }
             Event::Refused { seq, code } => {
                 self.remark(now, "the robot refused a line", &format!("number {seq}, {code}"));
+            }
+            Event::ExtruderDown { reason } => {
+                self.remark(now, "the link to the extruder was lost", reason);
+            }
+            // They come at the rate of the commands; the recording has them all.
+            Event::ExtruderRefused { seq, code } if !self.refused.contains(code) => {
+                self.refused.push(code.clone());
+                let why = format!("number {seq}, {code}");
+                self.remark(now, "the extruder refused a line, the first of its kind", &why);
             }
             _ => {}
         }

@@ -56,7 +56,9 @@ pub const fn extruder_hold(hold: ExtruderHold) -> &'static str {
 pub fn extruder_fault(fault: ExtruderFault) -> String {
     match fault {
         ExtruderFault::HeldTooLong(why) => format!("held_too_long_{}", extruder_hold(why)),
+        ExtruderFault::NoAnswer => "no_answer".to_owned(),
         ExtruderFault::DidNotStart => "did_not_start".to_owned(),
+        ExtruderFault::RunsOn => "runs_on".to_owned(),
         ExtruderFault::Pump => "pump".to_owned(),
         ExtruderFault::Overpressure => "overpressure".to_owned(),
         ExtruderFault::SpeedMismatch => "speed_mismatch".to_owned(),

@@ -1,17 +1,27 @@
-//! Whether a cell uses a model where it was identified.
+//! Whether a cell uses its model where it was identified, and its profile as
+//! fast as its limits allow.
 
 use crate::cli::cell::ExtruderSide;
 use crate::config::cell::ExtruderPart;
-use crate::config::extruder::Strategy;
+use crate::extruder::Law;
+use crate::extruder::law::Played;
 use crate::identify::file as model;
+use crate::identify::profile::Point;
 
-/// What to say where the command that the model has for the wanted flow lies
-/// outside the inputs that it was identified with; none where it lies within
-/// them, and where the strategy has no model.
-pub fn beyond_model(part: &ExtruderPart, side: &ExtruderSide) -> anyhow::Result<Option<String>> {
-    let (Strategy::Feedforward(_), Some(file)) = (&part.extruder.strategy, &side.file) else {
-        return Ok(None);
-    };
+/// What to say where the strategy asks for what the extruder or its model does
+/// not give; none where all is well.
+pub fn beyond(part: &ExtruderPart, side: &ExtruderSide) -> anyhow::Result<Option<String>> {
+    match &side.setup.law {
+        Law::Feedforward(_) => beyond_model(part, side),
+        Law::Profile(played) => Ok(too_fast(part, side, played)),
+        _ => Ok(None),
+    }
+}
+
+/// Where the command that the model has for the wanted flow lies outside the
+/// limits, or outside the inputs that the model was identified with.
+fn beyond_model(part: &ExtruderPart, side: &ExtruderSide) -> anyhow::Result<Option<String>> {
+    let Some(file) = &side.file else { return Ok(None) };
     let model = model::parse(&file.source, &file.text)?;
     let flow = part.demand.nominal().get();
     let (input, output) = model.operating_point;
@@ -33,4 +43,29 @@ pub fn beyond_model(part: &ExtruderPart, side: &ExtruderSide) -> anyhow::Result<
             file.source
         )
     }))
+}
+
+/// Where a profile goes on before the fastest change has brought the command
+/// to its value. Its first value is no change.
+fn too_fast(part: &ExtruderPart, side: &ExtruderSide, played: &Played) -> Option<String> {
+    let profile = played.profile();
+    let rate = part.extruder.limits.rate_per_s();
+    let ends = profile.points().iter().skip(2).map(|point| point.from_s);
+    let steps = profile.points().windows(2).zip(ends.chain([profile.end_s()]));
+    let (mut missed, mut first) = (0_usize, None);
+    for (pair, until_s) in steps {
+        let [before, Point { from_s, value }] = pair else { continue };
+        let takes_s = (value - before.value).abs() / rate;
+        if takes_s > until_s - from_s {
+            missed += 1;
+            first.get_or_insert((*from_s, (value - before.value).abs(), takes_s, until_s - from_s));
+        }
+    }
+    let (from_s, by, takes_s, has_s) = first?;
+    let (unit, source) = (part.extruder.drive.unit_word(), side.file.as_ref()?.source.as_str());
+    Some(format!(
+        "{source}: {missed} of its changes are not made to their end: that of {by:.4} {unit} at \
+         {from_s:.2} s takes {takes_s:.3} s at max_{unit}_per_s = {rate}, and the next one comes \
+         after {has_s:.3} s"
+    ))
 }

@@ -23,15 +23,21 @@ pub struct ExtruderPart {
     pub plant_nominal: Mm3PerS,
 }
 
+/// What stands beside the extruder in its cell; none of what could not be read.
+#[derive(Debug, Clone, Copy)]
+pub struct Beside<'a> {
+    /// Width of the bead, and the speed at which it begins.
+    pub bead: Option<(Mm, MmPerS)>,
+    /// Host and port of the robot.
+    pub robot_address: Option<&'a str>,
+    /// The simulated bead.
+    pub simulation: Option<&'a Simulation>,
+}
+
 impl ExtruderPart {
-    /// Reads both tables for a bead of this width at this speed; none where the
-    /// extruder goes its own way, and where a violation was reported.
-    pub fn read(
-        root: &Table<'_>,
-        folder: &Path,
-        bead: Option<(Mm, MmPerS)>,
-        simulation: Option<&Simulation>,
-    ) -> Option<Self> {
+    /// Reads both tables for what stands beside them; none where the extruder
+    /// goes its own way, and where a violation was reported.
+    pub fn read(root: &Table<'_>, folder: &Path, beside: &Beside<'_>) -> Option<Self> {
         let plant_table = root.optional_run_table("extruder_plant");
         let plant = plant_table.as_ref().and_then(ExtruderPlant::read);
         let Some(table) = root.optional_run_table("extruder") else {
@@ -48,9 +54,15 @@ impl ExtruderPart {
         if let (Some(plant), Some(plant_table)) = (&plant, &plant_table) {
             compare(&extruder, &table, &plant.kind, plant_table);
         }
-        let (target, speed) = bead?;
+        if let Some(link) = &extruder.link
+            && beside.robot_address == Some(&link.address)
+        {
+            let expected = "another than robot.address: each has a controller of its own";
+            table.report("address", format!("\"{}\"", link.address), expected);
+        }
+        let (target, speed) = beside.bead?;
         let demand = extruder.demand(&table, target, speed)?;
-        let model = simulation?.bead;
+        let model = beside.simulation?.bead;
         let (width, at) =
             (Mm::new(model.width_mm).ok()?, MmPerS::new(model.at_speed_mm_per_s).ok()?);
         let plant_nominal = extruder.demand(&table, width, at)?.nominal();
@@ -84,7 +96,9 @@ fn compare(extruder: &Extruder, table: &Table<'_>, kind: &PlantKind, plant_table
         Strategy::Constant { .. } | Strategy::Profile { .. } => None,
     };
     let limited = extruder.max_pressure.map(|_| Need::Pressure);
-    for (key, need) in [("strategy", needed), ("max_pressure_mpa", limited)] {
+    let key =
+        if let Strategy::Feedforward(_) = extruder.strategy { "foretold_from" } else { "strategy" };
+    for (key, need) in [(key, needed), ("max_pressure_mpa", limited)] {
         if let Some(need) = need.filter(|need| !kind.reports(*need)) {
             let (reading, plant) = match need {
                 Need::Pressure => ("a pressure", "kind = \"pressure\""),

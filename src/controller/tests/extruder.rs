@@ -24,6 +24,7 @@ fn rig(law: Law) -> (ExtruderSetup, FlowDemand) {
         max_gap: Span::from_millis(200),
         max_hold: Span::from_secs(1.0),
         max_pressure: None,
+        filters: crate::extruder::ReadingFilters::default(),
         robot_follows: RobotFollows::Nothing,
     };
     let demand = FlowDemand::new(Mm2::constant(10.0), MmPerS::constant(SPEED), Follows::Robot);

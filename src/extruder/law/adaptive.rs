@@ -30,12 +30,56 @@ pub struct AdaptiveNozzle {
     reference: f64,
     wish: Wish,
     begun: bool,
+    /// What was applied since the last answer.
+    applied: Applied,
+}
+
+/// The mean of what was applied, which is all that the law's model of a held
+/// command can be told of.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Applied {
+    last: Option<(Stamp, f64)>,
+    secs: f64,
+    sum: f64,
+}
+
+impl Applied {
+    /// The last one held until now.
+    fn hold(&mut self, now: Stamp) {
+        if let Some((since, value)) = &mut self.last {
+            let secs = (now - *since).secs().max(0.0);
+            *since = now;
+            self.secs += secs;
+            self.sum += secs * *value;
+        }
+    }
+
+    /// Another one from now on.
+    fn set(&mut self, now: Stamp, value: f64) {
+        self.hold(now);
+        self.last = Some((now, value));
+    }
+
+    /// The mean until now; a new one begins. None where no time has passed.
+    fn take(&mut self, now: Stamp) -> Option<f64> {
+        self.hold(now);
+        let mean = (self.secs > 0.0).then_some(self.sum / self.secs);
+        (self.secs, self.sum) = (0.0, 0.0);
+        mean
+    }
 }
 
 impl AdaptiveNozzle {
     /// Before its first bead.
     pub fn new(law: AdaptiveLaw, nozzle: NozzleModel) -> Self {
-        Self { law, nozzle, reference: 0.0, wish: Wish::default(), begun: false }
+        Self {
+            law,
+            nozzle,
+            reference: 0.0,
+            wish: Wish::default(),
+            begun: false,
+            applied: Applied::default(),
+        }
     }
 
     /// Speed in the nozzle \[m/s\].
@@ -62,6 +106,7 @@ impl Strategy for AdaptiveNozzle {
         // What was learnt on the last bead still holds.
         self.wish = Wish::known(self.holding(speed) - self.law.estimate());
         self.begun = false;
+        self.applied = Applied::default();
         self.wish
     }
 
@@ -69,9 +114,12 @@ impl Strategy for AdaptiveNozzle {
         self.reference = self.law.reference_for(self.speed(flow));
     }
 
-    fn answer(&mut self, _now: Stamp, dt: Span, report: &ExtruderReport) -> Result<(), Unusable> {
+    fn answer(&mut self, now: Stamp, dt: Span, report: &ExtruderReport) -> Result<(), Unusable> {
         let flow = report.flow_mm3_per_s.ok_or(Unusable)?;
         let (measured, known) = (self.speed(flow), self.nozzle.pressure_kg_per_s);
+        if let Some(mean) = self.applied.take(now) {
+            self.law.settle(mean);
+        }
         if !self.begun {
             self.begun = true;
             // The flow is no steady one yet; what was learnt before still holds.
@@ -90,13 +138,14 @@ impl Strategy for AdaptiveNozzle {
         self.wish
     }
 
-    fn resume(&mut self, _now: Stamp, applied: f64) {
+    fn resume(&mut self, now: Stamp, applied: f64) {
         self.begun = false;
-        self.law.settle(applied);
+        self.applied = Applied::default();
+        self.settle(now, applied);
     }
 
-    fn settle(&mut self, _now: Stamp, applied: f64) {
-        self.law.settle(applied);
+    fn settle(&mut self, now: Stamp, applied: f64) {
+        self.applied.set(now, applied);
     }
 }
 
@@ -160,6 +209,28 @@ mod tests {
         let (mut law, _) = run(40.0, -0.004);
         let next = law.begin(Stamp::from_secs(60.0), wanted).value;
         assert!((next - 0.014).abs() < 2e-5, "{next}");
+    }
+
+    #[test]
+    fn a_command_that_climbs_within_a_hold_counts_by_its_mean() {
+        let (mut stepwise, mut at_once) = (law(), law());
+        let wanted = Mm3PerS::constant(1000.0);
+        let ms = Span::from_millis;
+        for law in [&mut stepwise, &mut at_once] {
+            let _ = law.begin(Stamp::START, wanted);
+            law.settle(Stamp::START, 0.004);
+            law.answer(Stamp::START, Span::ZERO, &report(500.0)).unwrap();
+        }
+        for i in 0_u32..10 {
+            let now = Stamp::START + ms(5 * i64::from(i));
+            stepwise.settle(now, 0.004 + 0.0004 * f64::from(i));
+            at_once.settle(now, 0.0058);
+        }
+        for law in [&mut stepwise, &mut at_once] {
+            law.answer(Stamp::START + ms(50), ms(50), &report(500.0)).unwrap();
+        }
+        let [a, b] = [stepwise, at_once].map(|law| law.wish().value);
+        assert!((a - b).abs() < 1e-12 && a.is_finite(), "{a} {b}");
     }
 
     #[test]

@@ -44,6 +44,11 @@ impl Played {
         Self { profile, at_s: 0.0 }
     }
 
+    /// What is played.
+    pub const fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
     /// How long the profile is; its last command is kept after that.
     pub fn lasts(&self) -> Span {
         Span::from_secs(self.profile.end_s())

@@ -45,6 +45,7 @@ fn supervisor(drive: Drive, law: Law, limits: CommandLimits) -> Supervisor {
         max_gap: Span::from_millis(200),
         max_hold: Span::from_secs(2.0),
         max_pressure: None,
+        filters: crate::extruder::ReadingFilters::default(),
         robot_follows: crate::extruder::RobotFollows::Nothing,
     })
 }
@@ -98,7 +99,9 @@ fn commanded(
     for tick in from..to {
         let now = Stamp::from_secs(f64::from(tick) * TICK.secs());
         if reports && tick.is_multiple_of(4) {
-            side.reported(now, &machine.report());
+            let runs = matches!(laying, Laying::Bead(_));
+            let pump = if runs { PumpMode::On } else { PumpMode::Off };
+            side.reported(now, &ExtruderReport { pump, ..machine.report() });
         }
         if let Some(command) = side.tick(now, laying) {
             told = command.pump_on.then_some(command.value);

@@ -18,6 +18,7 @@ fn setup(law: Law) -> ExtruderSetup {
         max_gap: Span::from_millis(200),
         max_hold: Span::from_secs(1.0),
         max_pressure: Some(MPa::constant(2.0)),
+        filters: ReadingFilters::default(),
         robot_follows: RobotFollows::Nothing,
     }
 }
@@ -121,13 +122,51 @@ fn a_fault_stays_until_the_robot_is_idle() {
     bench.go(0.5);
     bench.report = Some(report(PumpMode::Fault, 0.0));
     assert_eq!(bench.go(0.1), ExtruderState::Fault(ExtruderFault::Pump));
-    bench.report = Some(report(PumpMode::On, 30.0));
+    bench.report = Some(report(PumpMode::Off, 0.0));
     assert_eq!(bench.go(1.0), ExtruderState::Fault(ExtruderFault::Pump));
     bench.laying = Laying::Stopped;
     assert_eq!(bench.go(0.1), ExtruderState::Fault(ExtruderFault::Pump));
     bench.laying = Laying::Idle;
     assert_eq!(bench.go(0.1), ExtruderState::Off);
     bench.laying = Laying::Bead(FLOW);
+    bench.report = Some(report(PumpMode::On, 30.0));
+    assert_eq!(bench.go(0.1), ExtruderState::Running);
+}
+
+#[test]
+fn a_bead_that_no_extruder_answers_to_is_a_fault_within_the_longest_gap() {
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    bench.report = None;
+    assert_eq!(bench.go(0.15), ExtruderState::Starting);
+    assert_eq!(bench.go(0.1), ExtruderState::Fault(ExtruderFault::NoAnswer));
+    // One that answered before the bead and no more.
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    bench.laying = Laying::Idle;
+    bench.report = Some(report(PumpMode::Off, 0.0));
+    bench.go(0.5);
+    bench.report = None;
+    bench.go(2.0);
+    bench.laying = Laying::Bead(FLOW);
+    assert_eq!(bench.go(0.25), ExtruderState::Fault(ExtruderFault::NoAnswer));
+}
+
+#[test]
+fn a_pump_that_runs_on_is_a_fault_until_it_rests() {
+    let runs_on = ExtruderState::Fault(ExtruderFault::RunsOn);
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    bench.go(0.5);
+    bench.laying = Laying::Idle;
+    assert_eq!(bench.go(0.9), ExtruderState::Off);
+    assert_eq!(bench.go(0.3), runs_on);
+    // No bead is laid with a pump that does not obey.
+    bench.laying = Laying::Bead(FLOW);
+    assert_eq!(bench.go(0.5), runs_on);
+    assert!(!bench.last().pump_on);
+    bench.report = Some(report(PumpMode::Stopping, 5.0));
+    bench.laying = Laying::Idle;
+    assert_eq!(bench.go(0.1), ExtruderState::Off);
+    bench.laying = Laying::Bead(FLOW);
+    bench.report = Some(report(PumpMode::On, 30.0));
     assert_eq!(bench.go(0.1), ExtruderState::Running);
 }
 

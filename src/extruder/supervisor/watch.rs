@@ -6,7 +6,7 @@ use crate::extruder::Drive;
 use crate::extruder::law::Need;
 use crate::extruder::report::{ExtruderReport, PumpMode};
 use crate::extruder::state::{ExtruderFault, ExtruderHold};
-use crate::time::Stamp;
+use crate::time::{Span, Stamp};
 
 /// Share of the highest pressure below which it has fallen.
 const FALLEN: f64 = 0.95;
@@ -15,7 +15,10 @@ impl Supervisor {
     /// The extruder reported.
     pub fn reported(&mut self, now: Stamp, report: &ExtruderReport) {
         self.link_up = true;
-        self.report = Some((now, *report));
+        let seen = self.readings.pass(report);
+        self.report = Some((now, seen));
+        self.heard = Some(now);
+        self.see_whether_it_rests(now, report.pump);
         let too_high = self.relieve(report);
         if self.phase == Phase::Off || matches!(self.phase, Phase::Fault(_)) {
             return;
@@ -26,7 +29,7 @@ impl Supervisor {
         }
         match report.pump {
             PumpMode::Fault => self.phase = Phase::Fault(ExtruderFault::Pump),
-            PumpMode::On => self.runs(now, report),
+            PumpMode::On => self.runs(now, &seen),
             PumpMode::Starting => self.starts_anew(now, now),
             // A report may still tell of the time before the pump was told to run.
             PumpMode::Off | PumpMode::Stopping if now - self.begun <= self.setup.max_gap => {
@@ -37,6 +40,19 @@ impl Supervisor {
                     self.phase = Phase::Fault(ExtruderFault::Pump);
                 }
             }
+        }
+    }
+
+    /// A pump that is told to stop may take its time, but no longer than the
+    /// cell is patient.
+    fn see_whether_it_rests(&mut self, now: Stamp, pump: PumpMode) {
+        let runs = matches!(pump, PumpMode::On | PumpMode::Starting);
+        let told_to_rest = self.told.is_some_and(|told| !told.pump_on);
+        self.runs_on = if runs && told_to_rest { self.runs_on.or(Some(now)) } else { None };
+        if self.runs_on.is_some_and(|since| now - since > self.setup.max_hold) {
+            self.phase = Phase::Fault(ExtruderFault::RunsOn);
+        } else if !runs && self.phase == Phase::Fault(ExtruderFault::RunsOn) {
+            self.phase = Phase::Off;
         }
     }
 
@@ -117,6 +133,9 @@ impl Supervisor {
         });
         match self.phase {
             Phase::Running if !heard => self.hold(now, ExtruderHold::NoReading),
+            Phase::Starting { .. } if self.silent_for(now) > self.setup.max_gap => {
+                self.phase = Phase::Fault(ExtruderFault::NoAnswer);
+            }
             Phase::Starting { since } if now - since > self.setup.max_hold => {
                 self.phase = Phase::Fault(ExtruderFault::DidNotStart);
             }
@@ -125,6 +144,11 @@ impl Supervisor {
             }
             _ => {}
         }
+    }
+
+    /// How long nothing has been heard on this bead.
+    fn silent_for(&self, now: Stamp) -> Span {
+        now - self.heard.map_or(self.begun, |at| at.max(self.begun))
     }
 
     /// Keeps the last command; a first reason stays.

@@ -14,7 +14,8 @@ pub struct ExtruderWatch {
     config: ExtruderConfig,
     period: Span,
     shown: ExtruderState,
-    refused: Option<ErrCode>,
+    /// Reasons of refusals that the operator was told.
+    refused: Vec<ErrCode>,
     pump: Option<PumpMode>,
 }
 
@@ -22,7 +23,7 @@ impl ExtruderWatch {
     /// Of an extruder that has not been heard of, with the time from one step
     /// of its side to the next.
     pub const fn new(config: ExtruderConfig, period: Span) -> Self {
-        Self { config, period, shown: ExtruderState::Off, refused: None, pump: None }
+        Self { config, period, shown: ExtruderState::Off, refused: Vec::new(), pump: None }
     }
 
     /// The time from one step to the next.
@@ -43,17 +44,19 @@ impl ExtruderWatch {
                 None
             }
             ExtruderEvent::Up { hello, .. } => {
-                self.refused = None;
+                self.refused.clear();
                 Some(format!("extruder `{}` is connected", hello.name))
             }
             ExtruderEvent::Down { reason, .. } => {
                 self.pump = None;
                 Some(format!("extruder: {reason}"))
             }
-            // Commands go on at their rate, and so do refusals: one is enough.
+            // Commands go on at their rate, and so do refusals: one of a kind is
+            // enough.
+            ExtruderEvent::Refused { code, .. } if self.refused.contains(code) => None,
             ExtruderEvent::Refused { seq, code, text, .. } => {
-                let fresh = self.refused.replace(*code) != Some(*code);
-                fresh.then(|| format!("extruder refused line {seq}: {} {text}", code.word()))
+                self.refused.push(*code);
+                Some(format!("extruder refused line {seq}: {} {text}", code.word()))
             }
         }
     }
@@ -77,7 +80,9 @@ impl Loop<'_> {
             },
             ExtruderEvent::State { state, .. } => Event::Extruder(state.report),
             ExtruderEvent::Down { reason, .. } => Event::ExtruderDown { reason },
-            ExtruderEvent::Refused { .. } => return,
+            ExtruderEvent::Refused { seq, code, .. } => {
+                Event::ExtruderRefused { seq, code: code.word().to_owned() }
+            }
         };
         self.give(event);
     }

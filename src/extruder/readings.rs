@@ -1,0 +1,140 @@
+//! What is done to readings before a law goes by them: lone spikes out, noise
+//! smoothed, each with what is known by now (bcs-thesis, section on signals;
+//! one-sided). The limit on the pressure and the watch over the screw go by
+//! the readings as they come.
+
+use super::report::ExtruderReport;
+use crate::identify::hampel::{Hampel, LiveHampel};
+use crate::identify::savgol::{LiveSavGol, SavGol};
+use crate::units::{MPa, Mm, Mm3PerS};
+
+/// Which filters readings pass, in this order; by default none.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ReadingFilters {
+    /// Spikes give way to the median; a real step passes half a window late.
+    pub spikes: Option<Hampel>,
+    /// The end of a polynomial through the last readings.
+    pub smoothing: Option<SavGol>,
+}
+
+/// The readings of a connection on their way to the law.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Readings {
+    filters: ReadingFilters,
+    pressure: Passage,
+    flow: Passage,
+    filled: Passage,
+}
+
+impl Readings {
+    /// Before the first report.
+    pub fn new(filters: ReadingFilters) -> Self {
+        let passage = Passage::new(filters);
+        Self { filters, pressure: passage.clone(), flow: passage.clone(), filled: passage }
+    }
+
+    /// Forgets what was reported: after a gap it is no longer beside what comes.
+    pub fn forget(&mut self) {
+        *self = Self::new(self.filters);
+    }
+
+    /// The report as the law is to see it.
+    pub fn pass(&mut self, report: &ExtruderReport) -> ExtruderReport {
+        let pressure =
+            report.pressure_mpa.and_then(|mpa| MPa::new(self.pressure.pass(mpa.get())).ok());
+        let flow =
+            report.flow_mm3_per_s.and_then(|flow| Mm3PerS::new(self.flow.pass(flow.get())).ok());
+        let filled = report.filled_mm.and_then(|mm| Mm::new(self.filled.pass(mm.get())).ok());
+        ExtruderReport {
+            pressure_mpa: pressure,
+            flow_mm3_per_s: flow,
+            filled_mm: filled,
+            ..*report
+        }
+    }
+}
+
+/// One reading's filters with their windows.
+#[derive(Debug, Clone, PartialEq)]
+struct Passage {
+    spikes: Option<LiveHampel>,
+    smoothing: Option<LiveSavGol>,
+}
+
+impl Passage {
+    fn new(filters: ReadingFilters) -> Self {
+        Self {
+            spikes: filters.spikes.map(LiveHampel::new),
+            smoothing: filters.smoothing.map(|filter| LiveSavGol::new(&filter)),
+        }
+    }
+
+    fn pass(&mut self, reading: f64) -> f64 {
+        let lone = self.spikes.as_mut().map_or(reading, |filter| filter.step(reading));
+        // Until the window is full there is no polynomial.
+        self.smoothing.as_mut().and_then(|filter| filter.step(lone)).unwrap_or(lone)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::extruder::PumpMode;
+    use crate::sim::hash::{mix, normal_pair};
+    use crate::units::Rpm;
+
+    fn report(mpa: f64) -> ExtruderReport {
+        ExtruderReport {
+            pump: PumpMode::On,
+            valve_open: true,
+            screw_rpm: Some(Rpm::constant(30.0)),
+            pressure_mpa: MPa::new(mpa).ok(),
+            flow_mm3_per_s: None,
+            filled_mm: None,
+        }
+    }
+
+    fn passed(readings: &mut Readings, mpa: f64) -> f64 {
+        readings.pass(&report(mpa)).pressure_mpa.unwrap().get()
+    }
+
+    #[test]
+    fn without_filters_a_report_passes_as_it_is() {
+        let mut readings = Readings::new(ReadingFilters::default());
+        for mpa in [0.6, 7.0, 0.61] {
+            assert_eq!(readings.pass(&report(mpa)), report(mpa));
+        }
+    }
+
+    #[test]
+    fn a_lone_spike_does_not_pass_and_a_step_passes_half_a_window_late() {
+        let spikes = Hampel::new(2, 4.0).ok();
+        let mut readings = Readings::new(ReadingFilters { spikes, smoothing: None });
+        let noisy = |i: u64, mpa: f64| 0.007_f64.mul_add(normal_pair(mix(&[3, i]))[0], mpa);
+        for i in 0..200 {
+            let mpa = if i % 23 == 11 { 3.0 } else { noisy(i, 0.6) };
+            assert!((passed(&mut readings, mpa) - 0.6).abs() < 0.04, "{i}");
+        }
+        let after: Vec<f64> = (200..204).map(|i| passed(&mut readings, noisy(i, 0.9))).collect();
+        assert!(after[1] < 0.65 && after[2] > 0.85, "{after:?}");
+    }
+
+    #[test]
+    fn smoothing_follows_a_ramp_without_delay_and_takes_noise_away() {
+        let smoothing = SavGol::new(11, 1).ok();
+        let mut readings = Readings::new(ReadingFilters { spikes: None, smoothing });
+        let ramp: Vec<f64> = (0..30).map(|i| passed(&mut readings, 0.01 * f64::from(i))).collect();
+        assert!((ramp[29] - 0.29).abs() < 1e-12, "{}", ramp[29]);
+        readings.forget();
+        let (mut before, mut after) = (0.0, 0.0);
+        for i in 0..40_000 {
+            let off = 0.007 * normal_pair(mix(&[5, i]))[0];
+            let found = passed(&mut readings, 0.6 + off) - 0.6;
+            before += off * off;
+            after += found * found;
+        }
+        // At the end of eleven samples of a straight line: (2·(2·11 − 1))/(11·12).
+        let share: f64 = after / before;
+        assert!((share - 42.0 / 132.0).abs() < 0.03, "{share}");
+    }
+}
