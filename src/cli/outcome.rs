@@ -70,11 +70,16 @@ pub fn figures(summary: &Summary) {
     if let (Some(p50), Some(p99)) = (control.latency_ms.p50, control.latency_ms.p99) {
         say!("latency    {p50:.2} ms median, {p99:.2} ms p99");
     }
-    if let Some(extruder) = &summary.extruder
-        && let (Some(error), Some(mean)) =
-            (extruder.flow_error_rms_mm3_per_s, extruder.flow_mean_mm3_per_s)
-    {
-        say!("flow       {mean:.1} mm³/s on average, {error:.1} mm³/s RMS from what was wanted");
+    if let Some(extruder) = &summary.extruder {
+        let kept = extruder.flow_controlled;
+        if let (Some(error), Some(mean)) = (kept.error_rms_mm3_per_s, kept.mean_mm3_per_s) {
+            say!(
+                "flow       {mean:.1} mm³/s on average, {error:.1} mm³/s RMS from what was wanted, \
+                 since control began"
+            );
+        } else if let Some(mean) = extruder.flow_mean_mm3_per_s {
+            say!("flow       {mean:.1} mm³/s on average; the width's control did not begin");
+        }
     }
     if let Some(profile) = summary.extruder.as_ref().and_then(|extruder| extruder.profile) {
         say!(

@@ -24,6 +24,7 @@ const STATES: [&str; 5] = ["off", "starting", "running", "holding", "fault"];
 #[derive(Debug, Default)]
 pub struct ExtruderCharts {
     wanted: Series,
+    foretold: Series,
     flow: Series,
     sensed_flow: Series,
     command: Series,
@@ -57,6 +58,9 @@ impl ExtruderCharts {
             self.command.push(time, command.value);
             self.wanted.push(time, side.trace.flow_mm3_per_s.get());
             self.feedforward.push(time, side.trace.feedforward);
+            if let Some(foretold) = side.trace.foretold_mm3_per_s {
+                self.foretold.push(time, foretold.get());
+            }
         }
     }
 
@@ -96,7 +100,7 @@ impl ExtruderCharts {
                 @if drive != Drive::Rpm {
                     (sensor(&axis, &self.screw, "screw [rpm]", palette::SCREW))
                 }
-                (sensor(&axis, &self.filled, "filled length [mm]", palette::MODEL))
+                (sensor(&axis, &self.filled, "filled length [mm]", palette::FILLED))
                 @if let Some(summary) = summary { (times(summary)) }
             }
         }
@@ -113,15 +117,17 @@ impl ExtruderCharts {
             area: Area::wide(240.0),
             x: axis,
             y_title: "flow [mm³/s]",
-            y_range: y_range(&[&self.wanted, flow], &[0.0]),
+            y_range: y_range(&[&self.wanted, flow, &self.foretold], &[0.0]),
             layers: vec![
                 Layer::Wish(&self.wanted, palette::TARGET),
                 Layer::Curve(flow, palette::FLOW),
+                Layer::Wish(&self.foretold, palette::MODEL),
             ],
         };
         let entries = [
             (&self.wanted, ("wanted", palette::TARGET, "dash")),
             (flow, (name, palette::FLOW, "")),
+            (&self.foretold, ("foretold by the model", palette::MODEL, "dash")),
         ];
         html! { (legend::legend(&legend::drawn(&entries))) (plot.draw()) }
     }

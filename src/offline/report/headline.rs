@@ -153,12 +153,13 @@ fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
             ));
         }
     }
-    if let (Some(error), Some(mean)) =
-        (extruder.flow_error_mean_mm3_per_s, extruder.flow_mean_mm3_per_s)
+    let kept = extruder.flow_controlled;
+    if let (Some(error), Some(mean)) = (kept.error_mean_mm3_per_s, kept.mean_mm3_per_s)
         && error.abs() > FAR_OFF * mean.abs().max(1e-9)
     {
         sentences.push(format!(
-            "The flow was {error:+.1} mm³/s off on average, {mean:.1} mm³/s flowed."
+            "The flow was {error:+.1} mm³/s off on average after control began, {mean:.1} mm³/s \
+             flowed."
         ));
     }
     sentences
@@ -231,8 +232,8 @@ pub fn tiles(summary: &Summary) -> Markup {
                         &format!("median {}, longest {}", number(control.latency_ms.p50, 2), number(control.latency_ms.max, 2))))
                 }
                 @if let Some(extruder) = &summary.extruder && extruder.flow_mean_mm3_per_s.is_some() {
-                    (tile("flow", &number(extruder.flow_mean_mm3_per_s, 0), "mm³/s",
-                        &format!("{} mm³/s RMS from what was wanted", number(extruder.flow_error_rms_mm3_per_s, 0))))
+                    (tile("flow", &number(extruder.flow_controlled.mean_mm3_per_s.or(extruder.flow_mean_mm3_per_s), 0), "mm³/s",
+                        &format!("{} mm³/s RMS from what was wanted since control began", number(extruder.flow_controlled.error_rms_mm3_per_s, 0))))
                 }
             } @else {
                 (tile("uncertainty", &number(summary.sigma_mean_mm, 3), "mm", "mean standard deviation"))

@@ -43,6 +43,8 @@ pub const FLOW: Ink = ink("flow", [0, 138, 140], [64, 196, 196]);
 pub const PRESSURE: Ink = ink("pressure", [92, 72, 168], [160, 146, 230]);
 /// Speed of a screw or of a wheel, and whatever else an extruder is told.
 pub const SCREW: Ink = ink("screw", [150, 94, 40], [206, 152, 98]);
+/// Length of a screw that is filled.
+pub const FILLED: Ink = ink("filled", [82, 84, 116], [166, 168, 202]);
 /// What a model foretells; stands out of the data under it.
 pub const MODEL: Ink = ink("model", [176, 16, 48], [255, 128, 128]);
 /// What a source's own method does, beside this program's.
@@ -66,9 +68,9 @@ pub const RIGHT_EDGE: Ink = ink("right-edge", [240, 228, 66], [240, 228, 66]);
 /// The gauge in a picture.
 pub const GAUGE: Ink = ink("gauge", [0, 158, 115], [0, 158, 115]);
 
-const ALL: [Ink; 21] = [
-    WIDTH, TARGET, SPEED, SETPOINT, DEMAND, LIMIT, REJECTED, FLOW, PRESSURE, SCREW, MODEL, PAPER,
-    OURS, IDLE, PRIMING, TRACKING, HOLDING, FAULT, LEFT_EDGE, RIGHT_EDGE, GAUGE,
+const ALL: [Ink; 22] = [
+    WIDTH, TARGET, SPEED, SETPOINT, DEMAND, LIMIT, REJECTED, FLOW, PRESSURE, SCREW, FILLED, MODEL,
+    PAPER, OURS, IDLE, PRIMING, TRACKING, HOLDING, FAULT, LEFT_EDGE, RIGHT_EDGE, GAUGE,
 ];
 
 impl Ink {

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::profile::{ProfileSummary, ProfileTally};
 
-use crate::control::{Event, Step};
+use crate::control::{Event, State, Step};
 use crate::extruder::{CommandLimit, ExtruderFault, ExtruderState};
 use crate::offline::names;
 use crate::offline::stats::Moments;
@@ -33,9 +33,46 @@ pub struct ExtruderSummary {
     pub flow_error_mean_mm3_per_s: Option<f64>,
     /// Mean of that flow.
     pub flow_mean_mm3_per_s: Option<f64>,
+    /// The same three over bead laid after the width's control began: without
+    /// the extruder's start.
+    pub flow_controlled: FlowSummary,
     /// How far its profile was played, where it plays one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub profile: Option<ProfileSummary>,
+}
+
+/// How the flow was kept.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[expect(clippy::struct_field_names, reason = "the unit ends every name")]
+pub struct FlowSummary {
+    /// Root mean square of flow less wanted flow.
+    pub error_rms_mm3_per_s: Option<f64>,
+    /// Mean of that difference.
+    pub error_mean_mm3_per_s: Option<f64>,
+    /// Mean of the flow.
+    pub mean_mm3_per_s: Option<f64>,
+}
+
+/// Adds up flows.
+#[derive(Debug, Default)]
+struct FlowTally {
+    error: Moments,
+    flow: Moments,
+}
+
+impl FlowTally {
+    fn add(&mut self, wanted: Mm3PerS, flow: Mm3PerS) {
+        self.error.add((flow - wanted).get());
+        self.flow.add(flow.get());
+    }
+
+    fn finish(&self) -> FlowSummary {
+        FlowSummary {
+            error_rms_mm3_per_s: self.error.rms(),
+            error_mean_mm3_per_s: self.error.mean(),
+            mean_mm3_per_s: self.flow.mean(),
+        }
+    }
 }
 
 /// Adds up what the extruder side did.
@@ -47,8 +84,10 @@ pub struct ExtruderTally {
     held_for: BTreeMap<&'static str, Span>,
     limited_by: BTreeMap<&'static str, Span>,
     fault_reasons: BTreeMap<String, u64>,
-    error: Moments,
-    flow: Moments,
+    all: FlowTally,
+    controlled: FlowTally,
+    /// Whether the width's control has begun on this bead.
+    control_began: bool,
     profile: Option<ProfileTally>,
 }
 
@@ -59,6 +98,11 @@ impl ExtruderTally {
     }
 
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
+        match step.state {
+            State::Idle | State::Priming => self.control_began = false,
+            State::Tracking => self.control_began = true,
+            State::Holding(_) | State::Fault(_) => {}
+        }
         let Some(side) = &step.extruder else { return };
         self.commands += u64::from(side.command.is_some());
         if let Some((since, state, limit)) = self.last {
@@ -79,9 +123,10 @@ impl ExtruderTally {
     }
 
     pub fn flow(&mut self, wanted: Option<Mm3PerS>, flow: Mm3PerS) {
-        if let Some(wanted) = wanted {
-            self.error.add((flow - wanted).get());
-            self.flow.add(flow.get());
+        let Some(wanted) = wanted else { return };
+        self.all.add(wanted, flow);
+        if self.control_began {
+            self.controlled.add(wanted, flow);
         }
     }
 
@@ -91,15 +136,17 @@ impl ExtruderTally {
         let seconds = |times: &BTreeMap<&'static str, Span>| {
             times.iter().map(|(name, span)| (*name, span.secs())).collect()
         };
+        let all = self.all.finish();
         Some(ExtruderSummary {
             commands: self.commands,
             states_s: seconds(&self.states),
             held_for_s: seconds(&self.held_for),
             limited_by_s: seconds(&self.limited_by),
             fault_reasons: self.fault_reasons.clone(),
-            flow_error_rms_mm3_per_s: self.error.rms(),
-            flow_error_mean_mm3_per_s: self.error.mean(),
-            flow_mean_mm3_per_s: self.flow.mean(),
+            flow_error_rms_mm3_per_s: all.error_rms_mm3_per_s,
+            flow_error_mean_mm3_per_s: all.error_mean_mm3_per_s,
+            flow_mean_mm3_per_s: all.mean_mm3_per_s,
+            flow_controlled: self.controlled.finish(),
             profile: self.profile.and_then(ProfileTally::finish),
         })
     }
