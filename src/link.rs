@@ -12,6 +12,7 @@
 //! same manner.
 
 pub mod cell;
+mod count;
 pub mod extruder;
 mod fields;
 pub mod job;

@@ -320,6 +320,36 @@ fn the_inverse_of_a_model_gives_the_flow_of_a_plant_that_is_nearly_it() {
 }
 
 #[test]
+fn a_screw_that_was_weighed_needs_no_model() {
+    // 1300 mm³/s for each rpm.
+    let weighed = "strategy = \"feedforward\"\nmm3_per_turn = 78000.0";
+    let constant = "strategy = \"constant\"\nconstant_rpm = 60.0";
+    let summary = runs_through(CELL, &[(constant, weighed)], 0.7);
+    assert!(off(&summary).abs() < 0.03, "{summary}");
+    let folder = tempfile::tempdir().unwrap();
+    let checked = |changes: &[(&str, &str)]| {
+        fs::write(folder.path().join("cell.toml"), changed(CELL, changes)).unwrap();
+        let output = truebead(folder.path(), &["check", "cell.toml"]);
+        let [said, errors] = [output.stdout, output.stderr].map(|t| String::from_utf8(t).unwrap());
+        (output.status.code(), said + &errors)
+    };
+    let (status, said) = checked(&[(constant, weighed)]);
+    assert!(status == Some(0) && said.contains("which take 61.8"), "{said}");
+    assert!(!said.contains("WARNING"), "{said}");
+    let slim = weighed.replace("78000", "7800");
+    let (_, said) = checked(&[(constant, &slim)]);
+    assert!(said.contains("WARNING") && said.contains("[extruder] allows 0 to 90 rpm"), "{said}");
+    for (wrong, told) in [
+        (format!("{weighed}\nmodel = \"m.toml\""), "one of model, library and mm3_per_turn"),
+        (weighed.replace("78000.0", "-1.0"), "extruder.mm3_per_turn"),
+    ] {
+        let (status, said) = checked(&[(constant, &wrong)]);
+        assert!(status == Some(2) || said.contains("not for run"), "{said}");
+        assert!(said.contains(told), "{said}");
+    }
+}
+
+#[test]
 fn a_pressure_that_is_held_gives_the_flow_although_gain_and_load_change() {
     let cell = include_str!("../cells/extruder-pressure.toml");
     let held = runs_through(cell, &[], 0.06);

@@ -3,7 +3,7 @@
 pub mod extruder;
 mod range;
 
-pub use range::beyond;
+pub use range::{beyond, steady};
 
 use std::fs;
 use std::path::{Path, PathBuf};

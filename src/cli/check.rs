@@ -7,7 +7,7 @@ use clap::Args;
 use nalgebra::Point3;
 
 use super::WrongArguments;
-use super::cell::{LoadedCell, beyond};
+use super::cell::{ExtruderSide, LoadedCell, beyond, steady};
 use crate::calib::Calibration;
 use crate::config::Cell;
 use crate::config::cell::{Purpose, RunPart, Source};
@@ -31,11 +31,10 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     let loaded = LoadedCell::read(&args.cell, Purpose::Measure)?;
     check_height(&loaded)?;
     let run = Cell::parse(&args.cell, &loaded.text, Purpose::Run);
+    let run = run.map(|cell| LoadedCell { cell, ..loaded.clone() });
     // Everything that the extruder's strategy refers to, before anything is called
     // sound.
-    if let Ok(cell) = &run {
-        let _ = LoadedCell { cell: cell.clone(), ..loaded.clone() }.extruder()?;
-    }
+    let side = run.as_ref().map_or(Ok(None), LoadedCell::extruder)?;
     say!("{}: sound", args.cell.display());
     say!("  calibration  {}", loaded.calibration_words());
     if let Calibration::Full { image_size_px: [width, height], .. } = loaded.calibration {
@@ -50,12 +49,11 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     about_surface(&loaded);
     say!("  suffices for process, render");
     match run {
-        Ok(cell) => {
-            let loaded = LoadedCell { cell, ..loaded };
+        Ok(loaded) => {
             let Some(run) = &loaded.cell.run else { return Ok(ExitCode::SUCCESS) };
             about_purposes(run);
             about_run(run);
-            about_extruder(&loaded)?;
+            about_extruder(&loaded, side.as_ref())?;
         }
         Err(missing) => {
             say!("  not for run, simulate; these need besides:");
@@ -154,7 +152,7 @@ fn about_purposes(run: &RunPart) {
 }
 
 /// Tells of the extruder side, with all that it refers to.
-fn about_extruder(loaded: &LoadedCell) -> anyhow::Result<()> {
+fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::Result<()> {
     let part = loaded.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
     let Some(part) = part else { return Ok(()) };
     let (extruder, unit) = (&part.extruder, part.extruder.drive.unit_word());
@@ -163,8 +161,14 @@ fn about_extruder(loaded: &LoadedCell) -> anyhow::Result<()> {
         "  extruder     told {low} to {high} {unit}, {:.1} mm³/s wanted",
         part.demand.nominal().get()
     );
-    if let Some(side) = loaded.extruder()?
-        && let Some(words) = beyond(part, &side)?
+    if let Some(steady) = side.map_or(Ok(None), |side| steady(part, side))? {
+        let pressure = steady.pressure.map_or(String::new(), |pressure| {
+            format!(" and {:.3} MPa at the nozzle", pressure.get())
+        });
+        say!("               which take {:.4} {unit}{pressure} for long", steady.command);
+    }
+    if let Some(side) = side
+        && let Some(words) = beyond(part, side)?
     {
         say!("  WARNING      {words}");
     }

@@ -8,7 +8,7 @@ mod pressure;
 mod screw;
 
 pub use adaptive::{AdaptiveNozzle, NozzleModel};
-pub use feedforward::{Foreseen, ForetoldFrom, OperatingPoint};
+pub use feedforward::{Foreseen, OperatingPoint};
 pub use played::{Constant, Played};
 pub use pressure::{PressureChoice, PressureLoop, PressureSettings};
 pub use screw::ScrewFill;

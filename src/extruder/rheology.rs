@@ -3,7 +3,7 @@
 //! power law the pressure, the screw's drag flow its speed. Each both ways.
 //! Ma et al. 2026, eqs. (1) to (5).
 
-use crate::units::{MPa, Mm, Mm2, Mm3PerS, MmPerS, Rpm};
+use crate::units::{MPa, Mm, Mm3PerS, Rpm};
 
 /// A bead, a law or a quantity that cannot be.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -30,14 +30,6 @@ pub enum RheologyError {
         /// Name of the quantity, with its unit.
         what: &'static str,
     },
-}
-
-/// Speed along the path at which a flow fills a section.
-pub fn print_speed(flow: Mm3PerS, section: Mm2) -> Result<MmPerS, RheologyError> {
-    positive("the bead's section [mm²]", section.get())?;
-    not_negative("the flow [mm³/s]", flow.get())?;
-    MmPerS::new(flow.get() / section.get())
-        .map_err(|_| RheologyError::TooLarge { what: "the print speed [mm/s]" })
 }
 
 /// The melt in the nozzle: mass flow = k·P^α. Ma et al. 2026, eq. (4).
@@ -150,6 +142,7 @@ fn not_negative(what: &'static str, found: f64) -> Result<(), RheologyError> {
 mod tests {
     use super::*;
     use crate::extruder::demand;
+    use crate::units::MmPerS;
     use proptest::prelude::*;
 
     const WIDTH: Mm = Mm::constant(3.0);
@@ -198,9 +191,6 @@ mod tests {
             let screw = DragFlow::new(turn).unwrap();
             let back = screw.flow(screw.speed(flow).unwrap()).unwrap();
             prop_assert!((back.get() - flow.get()).abs() <= 1e-12 * flow.get());
-            let section = demand::section(WIDTH, HEIGHT).unwrap();
-            let speed = print_speed(flow, section).unwrap();
-            prop_assert!(((speed * section).get() - flow.get()).abs() <= 1e-12 * flow.get());
         }
     }
 }

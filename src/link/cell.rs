@@ -16,6 +16,7 @@
 //! setpoint may be ([`MAX_VALID_MS`]): a PC that is dead, or connected and
 //! mute, then leads to `HOLD` and `STOP` like one that falls silent later.
 
+use super::count::Count;
 use super::motion::{Drive, Motion, seconds};
 use super::{ErrCode, MAX_VALID_MS, ParamError, RobotLine, RobotParams};
 use crate::control::{RobotLimits, RobotMode, RobotState};
@@ -68,9 +69,7 @@ pub struct RobotCell {
     motion: Motion,
     bead_end: Option<f64>,
     z: Mm,
-    greeted: bool,
-    expected_seq: u64,
-    applied_seq: u64,
+    count: Count,
     faults: Faults,
 }
 
@@ -84,9 +83,7 @@ impl RobotCell {
             motion: Motion::default(),
             bead_end: None,
             z: params.z,
-            greeted: false,
-            expected_seq: 1,
-            applied_seq: 0,
+            count: Count::new(),
             faults: Faults::default(),
             params,
         })
@@ -96,19 +93,18 @@ impl RobotCell {
     /// last setpoint keeps running.
     pub fn connect(&mut self, now: Stamp) {
         self.disconnect(now);
-        self.expected_seq = 1;
-        self.applied_seq = 0;
+        self.count = Count::new();
     }
 
     /// The connection is gone. The last setpoint runs out.
     pub fn disconnect(&mut self, now: Stamp) {
         self.advance(now);
-        self.greeted = false;
+        self.count.leave();
     }
 
     /// Whether a PC is connected and has said `HELLO`.
     pub fn greeted(&self) -> bool {
-        self.greeted
+        self.count.greeted()
     }
 
     /// What it does.
@@ -180,7 +176,7 @@ impl RobotCell {
         let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
         RobotState {
             t_ms: self.clock_ms(),
-            seq: self.applied_seq,
+            seq: self.count.applied(),
             mode: self.mode(),
             speed_mm_per_s: MmPerS::new(finite(self.motion.speed)).unwrap_or_default(),
             path_mm: Mm::new(finite(self.motion.path)).unwrap_or_default(),

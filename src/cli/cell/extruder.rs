@@ -12,6 +12,7 @@ use crate::extruder::feedforward::{
 use crate::extruder::law::{
     AdaptiveNozzle, Constant, Foreseen, OperatingPoint, Played, PressureLoop, ScrewFill,
 };
+use crate::extruder::rheology::DragFlow;
 use crate::extruder::{ExtruderSetup, Law};
 use crate::identify::quantity::Unit;
 use crate::identify::{file as model, profile};
@@ -20,11 +21,16 @@ use crate::io::record::ExtruderFile;
 use crate::io::record::format::{MODEL_ATTACHMENT, PROFILE_ATTACHMENT};
 use crate::model::TransferFunction;
 use crate::time::Span;
+use crate::units::Rpm;
+
+/// What `identify` calls the command of a recording, before its unit.
+const COMMAND: &str = "command";
 
 /// What the strategy's file is called in a recording; none where it has none.
 pub fn attachment(strategy: &Strategy) -> Option<&'static str> {
     match strategy {
         Strategy::Profile { .. } => Some(PROFILE_ATTACHMENT),
+        Strategy::Feedforward(FeedforwardKeys { model: ModelSource::Screw(_), .. }) => None,
         Strategy::Feedforward(_) => Some(MODEL_ATTACHMENT),
         _ => None,
     }
@@ -76,7 +82,13 @@ pub fn setup(
         Strategy::Constant { value } => Law::Constant(Constant(*value)),
         Strategy::Profile { .. } => Law::Profile(played(needed()?, part)?),
         Strategy::Feedforward(keys) => {
-            Law::Feedforward(Box::new(foreseen(keys, run, part, cell, needed()?)?))
+            let behaviour = match &keys.model {
+                ModelSource::Screw(screw) => carried(screw)?,
+                ModelSource::File(_) | ModelSource::Library { .. } => {
+                    identified(keys, part, cell, needed()?)?
+                }
+            };
+            Law::Feedforward(Box::new(foreseen(keys, run, part, cell, behaviour)?))
         }
         Strategy::Pressure(settings) => Law::Pressure(Box::new(PressureLoop::new(**settings))),
         Strategy::Screw(settings) => Law::Screw(ScrewFill::new(settings)?),
@@ -89,17 +101,22 @@ fn wrong(cell: &str, what: &str) -> WrongArguments {
     WrongArguments::new(format!("{cell}: [extruder]: {what}"))
 }
 
-/// The inverse of the model that the cell names.
-fn foreseen(
+/// A screw that carries the same volume with every turn, as a model from rpm to
+/// mm³/s.
+fn carried(screw: &DragFlow) -> anyhow::Result<(TransferFunction, OperatingPoint)> {
+    let one = screw.flow(Rpm::constant(1.0))?;
+    Ok((TransferFunction::gain(one.get())?, OperatingPoint::default()))
+}
+
+/// The model of a file, from the cell's command to mm³/s.
+fn identified(
     keys: &FeedforwardKeys,
-    run: &RunPart,
     part: &ExtruderPart,
     cell: &str,
     file: &ExtruderFile,
-) -> anyhow::Result<Foreseen> {
+) -> anyhow::Result<(TransferFunction, OperatingPoint)> {
     let model = model::parse(&file.source, &file.text)?;
-    let extruder = &part.extruder;
-    let (unit, flow) = (extruder.drive.unit(), Unit::Mm3PerS);
+    let (unit, flow) = (part.extruder.drive.unit(), Unit::Mm3PerS);
     if model.input.unit != unit || model.output.unit != flow {
         let what = format!(
             "found a model from {} to {}, expected one from {unit} to {flow}",
@@ -115,33 +132,51 @@ fn foreseen(
         );
         return Err(wrong(cell, &what).into());
     }
+    if keys.foretold_from == ScrewSpeed::Measured && model.input.name == COMMAND {
+        let what = "found a model whose input was the command, expected one of the screw as it \
+                    was measured (identify --input screw_rpm) for foretold_from = \"encoder\"";
+        return Err(wrong(cell, what).into());
+    }
     let (command, flow_mm3_per_s) = model.operating_point;
+    Ok((model.transfer, OperatingPoint { command, flow_mm3_per_s }))
+}
+
+/// The inverse of how the extruder behaves about its operating point.
+fn foreseen(
+    keys: &FeedforwardKeys,
+    run: &RunPart,
+    part: &ExtruderPart,
+    cell: &str,
+    (transfer, about): (TransferFunction, OperatingPoint),
+) -> anyhow::Result<Foreseen> {
+    let extruder = &part.extruder;
     let settings = InverseSettings {
         time_constant_s: keys.time_constant_s,
         right_zeros: keys.right_zeros,
         known_ahead: Span::ZERO,
         late: keys.late,
-        limits: extruder.limits.about(command),
+        limits: extruder.limits.about(about.command),
         period: Span::from_secs(1.0 / extruder.rates.feedforward_hz),
     };
-    let tracker = Tracker::new(&model.transfer, &settings)
+    let tracker =
+        Tracker::new(&transfer, &settings).map_err(|error| wrong(cell, &error.to_string()))?;
+    let law = Foreseen::new(tracker, about);
+    let forecast = forecast(transfer, keys.foretold_from, run.robot.rate_hz, settings.period)
         .map_err(|error| wrong(cell, &error.to_string()))?;
-    let law = Foreseen::new(tracker, OperatingPoint { command, flow_mm3_per_s });
-    let forecast = forecast(model.transfer, run.robot.rate_hz, settings.period)
-        .map_err(|error| wrong(cell, &error.to_string()))?;
-    Ok(law.foretelling(forecast, keys.foretold_from))
+    Ok(law.foretelling(forecast))
 }
 
 /// What will flow when a setpoint of the robot that is given now has stood for
 /// half of its time, as far as the dead time lets that be known.
 fn forecast(
     model: TransferFunction,
+    screw: ScrewSpeed,
     robot_rate_hz: f64,
     period: Span,
 ) -> Result<FlowForecast, FeedforwardError> {
     let ahead = Span::from_secs(model.dead_time_s().min(0.5 / robot_rate_hz));
     let model = ExtruderModel { drive: TransferFunction::gain(1.0)?, flow: model };
-    FlowForecast::new(&model, ScrewSpeed::Modelled, ahead, period)
+    FlowForecast::new(&model, screw, ahead, period)
 }
 
 /// A profile of commands; one of another quantity, or beyond the limits, is

@@ -3,44 +3,81 @@
 
 use crate::cli::cell::ExtruderSide;
 use crate::config::cell::ExtruderPart;
+use crate::config::extruder::{ModelSource, Strategy};
 use crate::extruder::Law;
 use crate::extruder::law::Played;
 use crate::identify::file as model;
 use crate::identify::profile::Point;
+use crate::units::MPa;
+
+/// What a strategy comes to where it gives the wanted flow for long.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Steady {
+    /// In the unit of the command.
+    pub command: f64,
+    /// Pressure at the nozzle, for a strategy that holds it.
+    pub pressure: Option<MPa>,
+}
+
+/// The steady command of a strategy; none where it has none of its own.
+pub fn steady(part: &ExtruderPart, side: &ExtruderSide) -> anyhow::Result<Option<Steady>> {
+    let flow = part.demand.nominal();
+    match &part.extruder.strategy {
+        Strategy::Feedforward(keys) => {
+            let command = match (&keys.model, &side.file) {
+                (ModelSource::Screw(screw), _) => screw.speed(flow)?.get(),
+                (_, Some(file)) => {
+                    let model = model::parse(&file.source, &file.text)?;
+                    let (input, output) = model.operating_point;
+                    input + (flow.get() - output) / model.transfer.dc_gain()
+                }
+                (_, None) => return Ok(None),
+            };
+            Ok(Some(Steady { command, pressure: None }))
+        }
+        Strategy::Pressure(settings) => {
+            let pressure = settings.nozzle.pressure(flow)?;
+            let command = pressure.get() / settings.model.gain();
+            Ok(Some(Steady { command, pressure: Some(pressure) }))
+        }
+        _ => Ok(None),
+    }
+}
 
 /// What to say where the strategy asks for what the extruder or its model does
 /// not give; none where all is well.
 pub fn beyond(part: &ExtruderPart, side: &ExtruderSide) -> anyhow::Result<Option<String>> {
     match &side.setup.law {
-        Law::Feedforward(_) => beyond_model(part, side),
         Law::Profile(played) => Ok(too_fast(part, side, played)),
-        _ => Ok(None),
+        _ => match steady(part, side)? {
+            Some(steady) => beyond_limits_or_model(part, side, steady.command),
+            None => Ok(None),
+        },
     }
 }
 
-/// Where the command that the model has for the wanted flow lies outside the
-/// limits, or outside the inputs that the model was identified with.
-fn beyond_model(part: &ExtruderPart, side: &ExtruderSide) -> anyhow::Result<Option<String>> {
-    let Some(file) = &side.file else { return Ok(None) };
-    let model = model::parse(&file.source, &file.text)?;
-    let flow = part.demand.nominal().get();
-    let (input, output) = model.operating_point;
-    let command = input + (flow - output) / model.transfer.dc_gain();
-    let (low, high) = model.input_range;
-    let unit = part.extruder.drive.unit_word();
+/// Where a steady command lies outside the limits, or outside the inputs that
+/// its model was identified with.
+fn beyond_limits_or_model(
+    part: &ExtruderPart,
+    side: &ExtruderSide,
+    command: f64,
+) -> anyhow::Result<Option<String>> {
+    let (flow, unit) = (part.demand.nominal().get(), part.extruder.drive.unit_word());
+    let source = side.file.as_ref().map_or("[extruder]", |file| file.source.as_str());
     let (min, max) = part.extruder.limits.range();
     if !(min..=max).contains(&command) {
         return Ok(Some(format!(
-            "{}: {flow:.1} mm³/s take {command:.4} {unit}, but [extruder] allows {min} to {max} \
-             {unit}; the bead will not have its flow",
-            file.source
+            "{source}: {flow:.1} mm³/s take {command:.4} {unit}, but [extruder] allows {min} to \
+             {max} {unit}; the bead will not have its flow"
         )));
     }
+    let Some(file) = &side.file else { return Ok(None) };
+    let (low, high) = model::parse(&file.source, &file.text)?.input_range;
     Ok((!(low..=high).contains(&command)).then(|| {
         format!(
-            "{}: {flow:.1} mm³/s take {command:.4} {unit}, but it was identified from {low} to \
-             {high} {unit}; what it says there is a guess",
-            file.source
+            "{source}: {flow:.1} mm³/s take {command:.4} {unit}, but it was identified from {low} \
+             to {high} {unit}; what it says there is a guess"
         )
     }))
 }

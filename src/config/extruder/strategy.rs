@@ -6,8 +6,9 @@ use super::{ANY, About, adaptive, keys, pressure, screw};
 use crate::document::Table;
 use crate::extruder::Drive;
 use crate::extruder::adaptive::AdaptiveLaw;
-use crate::extruder::feedforward::RightZeros;
-use crate::extruder::law::{ForetoldFrom, NozzleModel, PressureSettings};
+use crate::extruder::feedforward::{RightZeros, ScrewSpeed};
+use crate::extruder::law::{NozzleModel, PressureSettings};
+use crate::extruder::rheology::DragFlow;
 use crate::extruder::screw::control::ScrewSettings;
 use crate::identify::library::{TOLERANCE_C, Wanted};
 use crate::identify::quantity::Unit;
@@ -48,7 +49,7 @@ pub struct FeedforwardKeys {
     /// What becomes of zeros in the right half plane.
     pub right_zeros: RightZeros,
     /// What the flow is foretold from.
-    pub foretold_from: ForetoldFrom,
+    pub foretold_from: ScrewSpeed,
 }
 
 /// Where a model comes from.
@@ -63,6 +64,8 @@ pub enum ModelSource {
         /// What is looked for.
         wanted: Wanted,
     },
+    /// None: a screw that carries the same volume with every turn, at once.
+    Screw(DragFlow),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -132,15 +135,20 @@ fn needs(table: &Table<'_>, about: &About<'_>, drive: Drive) {
 
 fn read_feedforward(table: &Table<'_>, about: &About<'_>) -> Option<FeedforwardKeys> {
     let model = read_model(table, about);
-    let time_constant = table.number("time_constant_s", 1e-3..=60.0);
+    // A screw that follows at once leaves no pole to be placed.
+    let time_constant = if matches!(model, Some(ModelSource::Screw(_))) {
+        table.number_or("time_constant_s", 1e-3..=60.0, 1.0)
+    } else {
+        table.number("time_constant_s", 1e-3..=60.0)
+    };
     let late = table.number_or("late_s", 0.0..=60.0, 0.0);
     let right_zeros = table
         .choice("right_zeros", &[("refuse", RightZeros::Refuse), ("mirror", RightZeros::Mirror)]);
     let foretold_from = table.choice(
         "foretold_from",
-        &[("command", ForetoldFrom::Command), ("encoder", ForetoldFrom::Encoder)],
+        &[("command", ScrewSpeed::Modelled), ("encoder", ScrewSpeed::Measured)],
     );
-    if foretold_from == Some(ForetoldFrom::Encoder) && about.drive != Drive::Rpm {
+    if foretold_from == Some(ScrewSpeed::Measured) && about.drive != Drive::Rpm {
         let expected = "\"command\", or command = \"rpm\", which is what an encoder reports";
         table.report("foretold_from", "\"encoder\"", expected);
     }
@@ -153,7 +161,25 @@ fn read_feedforward(table: &Table<'_>, about: &About<'_>) -> Option<FeedforwardK
     })
 }
 
+/// A screw or a wheel in place of a model.
+fn read_turn(table: &Table<'_>, about: &About<'_>) -> Option<DragFlow> {
+    let volume = table.number("mm3_per_turn", 1e-6..=1e12);
+    if table.has("model") || table.has("library") {
+        let expected = "one of model, library and mm3_per_turn";
+        table.report("mm3_per_turn", "a volume beside a model", expected);
+        table.pass_over();
+    }
+    if about.drive != Drive::Rpm {
+        let expected = "a model, or command = \"rpm\", which turns a screw";
+        table.report("mm3_per_turn", "a volume for each turn", expected);
+    }
+    DragFlow::new(volume?).ok()
+}
+
 fn read_model(table: &Table<'_>, about: &About<'_>) -> Option<ModelSource> {
+    if table.has("mm3_per_turn") {
+        return read_turn(table, about).map(ModelSource::Screw);
+    }
     match (table.has("model"), table.has("library")) {
         (true, true) => {
             table.report("library", "a library beside a model", "one of model and library");

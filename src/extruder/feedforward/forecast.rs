@@ -98,6 +98,11 @@ impl FlowForecast {
         Mm3PerS::new(self.flow.step(rpm)).unwrap_or_default()
     }
 
+    /// Whether the screw's measured speed takes part.
+    pub const fn screw(&self) -> ScrewSpeed {
+        self.screw
+    }
+
     /// How far ahead of now its flow is \[s\].
     pub fn ahead_s(&self) -> f64 {
         self.ahead_s

@@ -2,10 +2,10 @@
 //! becomes the command that gives it. bcs-thesis, chapter 4.
 
 use super::{Need, Strategy, Unusable, Wish};
-use crate::extruder::feedforward::{FlowForecast, Tracker};
+use crate::extruder::feedforward::{FlowForecast, ScrewSpeed, Tracker};
 use crate::extruder::report::ExtruderReport;
 use crate::time::{Span, Stamp};
-use crate::units::Mm3PerS;
+use crate::units::{Mm3PerS, Rpm};
 
 /// Longest time without a tick that is made up for \[s\].
 const MOST_BEHIND_S: f64 = 2.0;
@@ -19,23 +19,12 @@ pub struct OperatingPoint {
     pub flow_mm3_per_s: f64,
 }
 
-/// What the flow is foretold from. The inverse itself goes by the command: a
-/// drive that is late would make a loop of it through the encoder.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ForetoldFrom {
-    /// The command as it was applied.
-    Command,
-    /// The screw as its encoder reports it, in place of a model of the drive
-    /// (thesis, section 5.3.1). The command is in rpm then.
-    Encoder,
-}
-
-impl ForetoldFrom {
-    /// The reading that takes.
+impl ScrewSpeed {
+    /// The reading that a forecast with it takes.
     pub const fn need(self) -> Option<Need> {
         match self {
-            Self::Command => None,
-            Self::Encoder => Some(Need::Screw),
+            Self::Modelled => None,
+            Self::Measured => Some(Need::Screw),
         }
     }
 }
@@ -53,13 +42,13 @@ pub struct Foreseen {
     behind_s: f64,
 }
 
-/// The flow that is to come.
+/// The flow that is to come. It alone may go by an encoder; the inverse goes by
+/// the command, for a drive that is late would make a loop of it.
 #[derive(Debug, Clone, PartialEq)]
 struct Outlook {
     forecast: FlowForecast,
-    from: ForetoldFrom,
-    /// Speed of the screw in the last report \[rpm\].
-    turning: Option<f64>,
+    /// Speed of the screw in the last report.
+    turning: Option<Rpm>,
     flow: Mm3PerS,
 }
 
@@ -71,10 +60,10 @@ impl Foreseen {
     }
 
     /// The same, which also says what will flow. The forecast takes the command
-    /// or the screw's speed, and gives flow, as differences from the operating
+    /// and the screw's speed, and gives flow, as differences from the operating
     /// point.
-    pub fn foretelling(mut self, forecast: FlowForecast, from: ForetoldFrom) -> Self {
-        self.outlook = Some(Outlook { forecast, from, turning: None, flow: Mm3PerS::ZERO });
+    pub fn foretelling(mut self, forecast: FlowForecast) -> Self {
+        self.outlook = Some(Outlook { forecast, turning: None, flow: Mm3PerS::ZERO });
         self
     }
 
@@ -94,11 +83,8 @@ impl Outlook {
     }
 
     fn pass(&mut self, applied: f64, about: &OperatingPoint) {
-        let driven = match self.from {
-            ForetoldFrom::Command => applied,
-            ForetoldFrom::Encoder => self.turning.unwrap_or(applied),
-        };
-        let off = self.forecast.step(driven - about.command, None).get();
+        let turning = self.turning.and_then(|rpm| Rpm::new(rpm.get() - about.command).ok());
+        let off = self.forecast.step(applied - about.command, turning).get();
         let flow = (about.flow_mm3_per_s + off).max(0.0);
         self.flow = Mm3PerS::new(flow).unwrap_or_default();
     }
@@ -106,7 +92,7 @@ impl Outlook {
 
 impl Strategy for Foreseen {
     fn needs(&self) -> &'static [Need] {
-        match self.outlook.as_ref().and_then(|outlook| outlook.from.need()) {
+        match self.outlook.as_ref().and_then(|outlook| outlook.forecast.screw().need()) {
             Some(Need::Screw) => &[Need::Screw],
             _ => &[],
         }
@@ -127,7 +113,7 @@ impl Strategy for Foreseen {
 
     fn hear(&mut self, _now: Stamp, report: &ExtruderReport) -> Result<(), Unusable> {
         if let Some(outlook) = &mut self.outlook {
-            outlook.turning = report.screw_rpm.map(f64::from);
+            outlook.turning = report.screw_rpm;
         }
         Ok(())
     }
@@ -261,10 +247,10 @@ mod tests {
         assert!(most < 1.03, "{most}");
     }
 
-    fn forecast(model: &TransferFunction, ahead: Span) -> FlowForecast {
+    fn forecast(model: &TransferFunction, screw: ScrewSpeed, ahead: Span) -> FlowForecast {
         let drive = TransferFunction::gain(1.0).unwrap();
         let whole = ExtruderModel { drive, flow: model.clone() };
-        FlowForecast::new(&whole, ScrewSpeed::Modelled, ahead, PERIOD).unwrap()
+        FlowForecast::new(&whole, screw, ahead, PERIOD).unwrap()
     }
 
     #[test]
@@ -272,9 +258,9 @@ mod tests {
         // The screw turns a quarter less than it is told.
         let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
         let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
-        let told_of = |from: ForetoldFrom| {
+        let told_of = |screw| {
             let mut law = law(&model, limits, OperatingPoint::default(), 0.1)
-                .foretelling(forecast(&model, Span::ZERO), from);
+                .foretelling(forecast(&model, screw, Span::ZERO));
             let mut told = law.begin(Stamp::START, Mm3PerS::constant(480.0)).value;
             for _ in 0..2000 {
                 law.settle(Stamp::START, told);
@@ -285,9 +271,9 @@ mod tests {
             }
             (law.needs().len(), law.foretold().unwrap().get())
         };
-        let (needs, flow) = told_of(ForetoldFrom::Encoder);
+        let (needs, flow) = told_of(ScrewSpeed::Measured);
         assert!(needs == 1 && (flow - 360.0).abs() < 0.1, "{needs} {flow}");
-        let (needs, flow) = told_of(ForetoldFrom::Command);
+        let (needs, flow) = told_of(ScrewSpeed::Modelled);
         assert!(needs == 0 && (flow - 480.0).abs() < 0.1, "{needs} {flow}");
     }
 
@@ -297,8 +283,11 @@ mod tests {
         let limits = CommandLimits::new(0.0, 60.0, 1e6).unwrap();
         let about = OperatingPoint { command: 30.0, flow_mm3_per_s: 360.0 };
         let ahead = Span::from_millis(100);
-        let mut law = law(&model, limits, about, 0.25)
-            .foretelling(forecast(&model, ahead), ForetoldFrom::Command);
+        let mut law = law(&model, limits, about, 0.25).foretelling(forecast(
+            &model,
+            ScrewSpeed::Modelled,
+            ahead,
+        ));
         let mut plant = Simulator::new(&model, 0.005, Between::Held).unwrap();
         let mut told = law.begin(Stamp::START, Mm3PerS::constant(480.0)).value.min(60.0);
         assert_eq!(law.foretold(), Some(Mm3PerS::ZERO));
@@ -323,7 +312,7 @@ mod tests {
         let limits = CommandLimits::new(0.0, 90.0, 1e6).unwrap();
         let ended = |ticks: i64, count: usize| {
             let mut law = law(&model, limits, OperatingPoint::default(), 0.25)
-                .foretelling(forecast(&model, Span::ZERO), ForetoldFrom::Command);
+                .foretelling(forecast(&model, ScrewSpeed::Modelled, Span::ZERO));
             let _ = law.begin(Stamp::START, Mm3PerS::constant(480.0));
             law.settle(Stamp::START, 40.0);
             for _ in 0..count {

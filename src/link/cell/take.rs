@@ -1,13 +1,11 @@
 //! What the robot does with a line of the PC.
 
 use super::{Doing, RobotCell};
+use crate::link::count::{Clock, Refusal};
 use crate::link::robot_line::mode_word;
-use crate::link::{ErrCode, MAX_VALID_MS, MIN_VALID_MS, PcLine, RobotLine, RobotParams};
+use crate::link::{ErrCode, PcLine, RobotLine, RobotParams};
 use crate::time::Stamp;
 use crate::units::MmPerS;
-
-/// Why a line is refused: the code and a text for the operator.
-type Refusal = (ErrCode, String);
 
 impl RobotCell {
     /// Takes a line of the PC; the answer is `HELLO`, or `ERR` where the line
@@ -16,7 +14,7 @@ impl RobotCell {
         self.advance(now);
         let (seq, taken) = match line {
             PcLine::Hello => {
-                self.greeted = true;
+                self.count.greet();
                 return Some(RobotLine::Hello(self.limits()));
             }
             PcLine::Bye => return None,
@@ -36,9 +34,9 @@ impl RobotCell {
     /// A stop is obeyed even where the count is broken; the PC hears of that
     /// all the same.
     fn take_stop(&mut self, seq: u64) -> Result<(), Refusal> {
-        let counted = self.check_count(seq);
+        let counted = self.count.check(seq);
         if counted.is_ok() {
-            self.applied_seq = seq;
+            self.count.apply(seq);
         }
         // Out of motion there is nothing to stop, and STOP is left by hand only.
         if matches!(self.doing, Doing::Print { .. } | Doing::Hold { .. }) {
@@ -54,7 +52,7 @@ impl RobotCell {
         valid_ms: u64,
         ref_t_ms: u64,
     ) -> Result<(), Refusal> {
-        self.check_count(seq)?;
+        self.count.check(seq)?;
         if let Some(code) = self.faults.refuse {
             return Err((code, "refused on purpose".to_owned()));
         }
@@ -66,37 +64,10 @@ impl RobotCell {
         if speed < min || speed > max {
             return Err((ErrCode::Range, format!("{speed} is not within {min} to {max}")));
         }
-        if !(MIN_VALID_MS..=MAX_VALID_MS).contains(&valid_ms) {
-            let text =
-                format!("valid_ms {valid_ms} is not within {MIN_VALID_MS} to {MAX_VALID_MS}");
-            return Err((ErrCode::Range, text));
-        }
-        let t_ms = self.clock_ms();
-        if ref_t_ms > t_ms {
-            let text = format!("ref_t_ms {ref_t_ms} lies ahead of the robot's {t_ms}");
-            return Err((ErrCode::Range, text));
-        }
-        let until = self.stamp_of(ref_t_ms.saturating_add(valid_ms));
-        if until <= self.at {
-            let late_ms = t_ms.saturating_sub(ref_t_ms.saturating_add(valid_ms));
-            return Err((ErrCode::Stale, format!("void since {late_ms} ms")));
-        }
+        let clock = Clock { of: "robot", t_ms: self.clock_ms() };
+        let until = self.stamp_of(clock.void_ms(valid_ms, ref_t_ms)?);
         self.doing = Doing::Print { target: speed, until };
-        self.applied_seq = seq;
+        self.count.apply(seq);
         Ok(())
-    }
-
-    /// After a gap the count goes on from what came, so that one lost line
-    /// costs one refusal and not the connection.
-    fn check_count(&mut self, seq: u64) -> Result<(), Refusal> {
-        if !self.greeted {
-            return Err((ErrCode::Form, "HELLO must come first".to_owned()));
-        }
-        let expected = self.expected_seq;
-        self.expected_seq = expected.max(seq.saturating_add(1));
-        if seq == expected {
-            return Ok(());
-        }
-        Err((ErrCode::Sequence, format!("expected {expected}")))
     }
 }

@@ -4,15 +4,13 @@
 
 use super::{DriveLine, ExtruderHello, ExtruderLine, ExtruderStatus};
 use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
-use crate::link::{ErrCode, MAX_VALID_MS, MIN_VALID_MS};
+use crate::link::ErrCode;
+use crate::link::count::{Clock, Count, Refusal};
 use crate::time::Stamp;
 
 const NS_PER_MS: u64 = 1_000_000;
 /// What stands without a command.
 const REST: ExtruderCommand = ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 };
-
-/// Why a line is refused: the code and a text for the operator.
-type Refusal = (ErrCode, String);
 
 /// Ways in which an extruder can misbehave, for tests and rehearsals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -28,9 +26,7 @@ pub struct Faults {
 pub struct Gate {
     hello: ExtruderHello,
     clock_start_ms: u64,
-    greeted: bool,
-    expected_seq: u64,
-    applied_seq: u64,
+    count: Count,
     /// The running command and when it is void.
     command: Option<(ExtruderCommand, Stamp)>,
     failed: bool,
@@ -44,9 +40,7 @@ impl Gate {
         Self {
             hello,
             clock_start_ms,
-            greeted: false,
-            expected_seq: 1,
-            applied_seq: 0,
+            count: Count::new(),
             command: None,
             failed: false,
             faults: Faults { refuse: None, mute: false },
@@ -56,14 +50,12 @@ impl Gate {
     /// A connection, which replaces an older one. The count begins again; the
     /// last command keeps running.
     pub const fn connect(&mut self) {
-        self.greeted = false;
-        self.expected_seq = 1;
-        self.applied_seq = 0;
+        self.count = Count::new();
     }
 
     /// The connection is gone. The last command runs out.
     pub const fn disconnect(&mut self) {
-        self.greeted = false;
+        self.count.leave();
     }
 
     /// The pump fails: it stops, and no command makes it run.
@@ -103,10 +95,10 @@ impl Gate {
     /// `HELLO`, and while it is mute.
     pub fn state(&self, now: Stamp, report: ExtruderReport) -> Option<ExtruderLine> {
         let pump = if self.failed { PumpMode::Fault } else { report.pump };
-        let (t_ms, seq) = (self.clock_ms(now), self.applied_seq);
+        let (t_ms, seq) = (self.clock_ms(now), self.count.applied());
         let report = ExtruderReport { pump, ..report };
         let line = ExtruderLine::State(ExtruderStatus { t_ms, seq, report });
-        (self.greeted && !self.faults.mute).then_some(line)
+        (self.count.greeted() && !self.faults.mute).then_some(line)
     }
 
     /// Takes a line of the PC; the answer is `HELLO`, or `ERR` where the line
@@ -114,7 +106,7 @@ impl Gate {
     pub fn take(&mut self, now: Stamp, line: DriveLine) -> Option<ExtruderLine> {
         match line {
             DriveLine::Hello => {
-                self.greeted = true;
+                self.count.greet();
                 Some(ExtruderLine::Hello(self.hello.clone()))
             }
             DriveLine::Bye => None,
@@ -137,7 +129,7 @@ impl Gate {
         command: ExtruderCommand,
         (valid_ms, ref_t_ms): (u64, u64),
     ) -> Result<(), Refusal> {
-        self.check_count(seq)?;
+        self.count.check(seq)?;
         if let Some(code) = self.faults.refuse {
             return Err((code, "refused on purpose".to_owned()));
         }
@@ -151,44 +143,16 @@ impl Gate {
         }
         let until = self.void_at(now, valid_ms, ref_t_ms)?;
         self.command = Some((command, until));
-        self.applied_seq = seq;
+        self.count.apply(seq);
         Ok(())
     }
 
     /// When a command is void, if it is not already.
     fn void_at(&self, now: Stamp, valid_ms: u64, ref_t_ms: u64) -> Result<Stamp, Refusal> {
-        if !(MIN_VALID_MS..=MAX_VALID_MS).contains(&valid_ms) {
-            let text =
-                format!("valid_ms {valid_ms} is not within {MIN_VALID_MS} to {MAX_VALID_MS}");
-            return Err((ErrCode::Range, text));
-        }
-        let t_ms = self.clock_ms(now);
-        if ref_t_ms > t_ms {
-            let text = format!("ref_t_ms {ref_t_ms} lies ahead of the extruder's {t_ms}");
-            return Err((ErrCode::Range, text));
-        }
-        let void_ms = ref_t_ms.saturating_add(valid_ms);
+        let clock = Clock { of: "extruder", t_ms: self.clock_ms(now) };
+        let void_ms = clock.void_ms(valid_ms, ref_t_ms)?;
         let since_start_ms = void_ms.saturating_sub(self.clock_start_ms);
-        let until = Stamp::from_ns(since_start_ms.saturating_mul(NS_PER_MS));
-        if until <= now {
-            let late_ms = t_ms.saturating_sub(void_ms);
-            return Err((ErrCode::Stale, format!("void since {late_ms} ms")));
-        }
-        Ok(until)
-    }
-
-    /// After a gap the count goes on from what came, so that one lost line
-    /// costs one refusal and not the connection.
-    fn check_count(&mut self, seq: u64) -> Result<(), Refusal> {
-        if !self.greeted {
-            return Err((ErrCode::Form, "HELLO must come first".to_owned()));
-        }
-        let expected = self.expected_seq;
-        self.expected_seq = expected.max(seq.saturating_add(1));
-        if seq == expected {
-            return Ok(());
-        }
-        Err((ErrCode::Sequence, format!("expected {expected}")))
+        Ok(Stamp::from_ns(since_start_ms.saturating_mul(NS_PER_MS)))
     }
 
     const fn clock_ms(&self, now: Stamp) -> u64 {
