@@ -125,7 +125,8 @@ pub struct IdentifyArgs {
         requires = "temperature_c"
     )]
     library: Option<PathBuf>,
-    /// Write a log of a simulated extruder to this folder, to try it with
+    /// Write logs of a simulated extruder to this folder, to try it with; a folder that
+    /// holds them already is refused
     #[arg(long, value_name = "DIR", exclusive = true)]
     example: Option<PathBuf>,
 }

@@ -34,6 +34,18 @@ pub fn refuse_a_recording_in(folder: &Path) -> Result<(), WrongArguments> {
     }
 }
 
+/// Refuses the name of an output that is there already: what somebody wrote is
+/// never replaced.
+pub fn refuse_replacing(path: &Path, what: &str) -> Result<(), WrongArguments> {
+    if !path.exists() {
+        return Ok(());
+    }
+    Err(WrongArguments::new(format!(
+        "{} is there already and would be lost; name another {what} with --out",
+        path.display()
+    )))
+}
+
 /// Prints the figures of a run to standard output, and gives its status.
 pub fn tell(report: &LiveReport, out: &Path, max_rejected_share: f64) -> ExitCode {
     figures(&report.summary);

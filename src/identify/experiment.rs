@@ -1,10 +1,13 @@
 //! An input and an output on an even grid, once nothing speaks against finding
 //! a model in them.
 
+mod error;
+mod outlier;
 mod suspicion;
 
 use std::fmt;
 
+pub use self::error::{ExperimentError, Side};
 pub use self::suspicion::doubt_unit;
 use super::grid::{Gap, Grid, usual_step};
 
@@ -15,101 +18,6 @@ pub const FEWEST_SAMPLES: usize = 50;
 const STEPS_S: std::ops::RangeInclusive<f64> = 2e-5..=2.0;
 /// A column that moves by less than this share of its size is constant.
 const STILL: f64 = 1e-9;
-
-/// Which of the two columns is meant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
-    /// What the extruder was told, or what drives it.
-    Input,
-    /// What came of it.
-    Output,
-}
-
-impl fmt::Display for Side {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Input => "input",
-            Self::Output => "output",
-        })
-    }
-}
-
-/// Data that no model can be found in. Samples are counted from 0.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ExperimentError {
-    /// Hardly anything there.
-    #[error("{got} samples: a model takes {FEWEST_SAMPLES} or more")]
-    TooFew {
-        /// Samples that there are.
-        got: usize,
-    },
-    /// Time that does not run on.
-    #[error(
-        "time {} at sample {}: {before_s} s, then {time_s} s; it must grow from line to line (write \
-         it with more digits, or keep one run alone)",
-        if .time_s == .before_s { "repeats" } else { "falls" }, .at + 1
-    )]
-    Order {
-        /// Sample.
-        at: usize,
-        /// The moment before it \[s\].
-        before_s: f64,
-        /// Its moment \[s\].
-        time_s: f64,
-    },
-    /// A unit of time that cannot be.
-    #[error(
-        "from sample to sample {step_s} s, if the unit of time is right: no log of an extruder has \
-         such steps. {}", if *.step_s > 1.0 {
-            "Is the column in ms? Say so with --unit COLUMN=ms; if it is right, with --unit COLUMN=s"
-        } else {
-            "Is the column in s? Say so with --unit COLUMN=s"
-        }
-    )]
-    TimeUnit {
-        /// The usual step \[s\].
-        step_s: f64,
-    },
-    /// Nothing logged for long.
-    #[error(
-        "a gap of {:.3} s after {:.3} s (sample {}){}; gaps up to {limit_s:.3} s are bridged: use a \
-         part without it, or allow longer ones with --max-gap-s", .gap.length_s, .gap.from_s,
-        .gap.after + 1, if *.count > 1 { format!(", the longest of {count}") } else { String::new() }
-    )]
-    Gap {
-        /// The longest one.
-        gap: Gap,
-        /// Gaps that are too long.
-        count: usize,
-        /// The longest that is bridged \[s\].
-        limit_s: f64,
-    },
-    /// A column that does not move.
-    #[error(
-        "the {side} is {value} all the time: nothing can be told from it{}",
-        if *.side == Side::Input { "; excite it (truebead excite writes profiles)" } else {
-            "; see that its sensor is connected"
-        }
-    )]
-    Constant {
-        /// Which one.
-        side: Side,
-        /// Its value.
-        value: f64,
-    },
-    /// One column twice.
-    #[error(
-        "input and output are the same from sample to sample: a model tells the one from the other. \
-         Was a command logged in place of what came of it?"
-    )]
-    Same,
-    /// A part that tells nothing.
-    #[error("{got} samples are left to validate with: {FEWEST_SAMPLES} or more are needed")]
-    ShortValidation {
-        /// Samples that there are.
-        got: usize,
-    },
-}
 
 /// What was done to the data, or is odd about them, in words.
 #[derive(Debug, Clone, PartialEq)]
@@ -195,6 +103,7 @@ impl Experiment {
         let notes = bridge(&grid, rules)?;
         for (side, values) in [(Side::Input, input), (Side::Output, output)] {
             check_moves(side, values)?;
+            outlier::check(side, values)?;
         }
         if input == output {
             return Err(ExperimentError::Same);

@@ -169,7 +169,7 @@ fn check_told(columns: &Columns, known: &[String], name: &str) -> Result<(), Wro
 /// The line in the file beside the number of the sample.
 fn at_line(table: &Table, first: usize, name: &str, error: ExperimentError) -> anyhow::Error {
     let sample = match &error {
-        ExperimentError::Order { at, .. } => Some(*at),
+        ExperimentError::Order { at, .. } | ExperimentError::Outlier { at, .. } => Some(*at),
         ExperimentError::Gap { gap, .. } => Some(gap.after),
         _ => None,
     };

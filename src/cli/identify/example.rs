@@ -4,18 +4,29 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 
+use crate::cli::WrongArguments;
 use crate::offline::output::{make_folder, write_whole};
 use crate::sim::logged;
 
+/// What its logs are called.
+const LOGS: [&str; 2] = ["log.csv", "other.csv"];
+
 /// Writes the logs of a simulated extruder.
 pub fn write(folder: &Path) -> Result<()> {
+    if let Some(taken) = LOGS.map(|name| folder.join(name)).iter().find(|path| path.exists()) {
+        let what = format!(
+            "{} is there already and would be lost; name another folder with --example",
+            taken.display()
+        );
+        return Err(WrongArguments::new(what).into());
+    }
     make_folder(folder)?;
     let log = logged::binary().context("the example")?;
     let other = logged::gaussian().context("the example")?;
-    write_whole(folder, "log.csv", log.to_csv().as_bytes())?;
-    write_whole(folder, "other.csv", other.to_csv().as_bytes())?;
+    write_whole(folder, LOGS[0], log.to_csv().as_bytes())?;
+    write_whole(folder, LOGS[1], other.to_csv().as_bytes())?;
     let truth = logged::truth().context("the example")?;
-    let [log, other] = ["log.csv", "other.csv"].map(|name| folder.join(name).display().to_string());
+    let [log, other] = LOGS.map(|name| folder.join(name).display().to_string());
     say!("example    {log}: a binary sequence of the screw's speed, and the flow");
     say!("           {other}: random levels, to validate with");
     say!(

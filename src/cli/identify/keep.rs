@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, anyhow};
 
 use crate::cli::WrongArguments;
+use crate::cli::outcome::refuse_replacing;
 use crate::identify::file::parse;
 use crate::identify::library::file_name;
 use crate::io::model_file::read_library;
@@ -16,14 +17,7 @@ pub const MODEL: &str = "model.toml";
 
 /// Refuses a folder that holds a model already.
 pub fn refuse_taken(folder: &Path) -> Result<(), WrongArguments> {
-    let path = folder.join(MODEL);
-    if !path.exists() {
-        return Ok(());
-    }
-    Err(WrongArguments::new(format!(
-        "{} is there already and would be lost; name another folder with --out",
-        path.display()
-    )))
+    refuse_replacing(&folder.join(MODEL), "folder")
 }
 
 /// Adds the text of a model, which `kept` holds as well, to a library. Fails

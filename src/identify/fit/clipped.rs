@@ -4,6 +4,7 @@
 use std::fmt;
 
 use super::samples::{FEWEST, Samples, ends};
+use crate::identify::number::short;
 
 /// Shortest run of equal samples that looks cut off.
 const RUN: usize = 3;
@@ -47,9 +48,9 @@ pub enum End {
 /// A signal that was cut off, and where.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "the {column} is cut off: {share_percent:.1} % of its samples stand at its {end}, {value}, in \
+    "the {column} is cut off: {share_percent:.1} % of its samples stand at its {end}, {}, in \
      {runs} runs, the longest of {longest} samples from {from_s:.3} s after the beginning on; {}",
-    advice(*.column)
+    short(*.value), advice(*.column)
 )]
 pub struct Clipped {
     /// Which column.

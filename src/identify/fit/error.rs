@@ -2,6 +2,7 @@
 
 use super::loose::Loose;
 use super::samples::SamplesError;
+use crate::identify::number::short;
 use crate::model::ModelError;
 
 /// Why there is no fit, with what was found.
@@ -20,8 +21,9 @@ pub enum FitError {
     },
     /// A range of dead times that is none.
     #[error(
-        "a dead time of {least_s} to {most_s} s; give a range that begins at 0 or above and ends \
-         above that, by half the record ({most_allowed_s:.3} s) at the latest"
+        "a dead time of {} to {} s; give a range that begins at 0 or above and ends \
+         above that, by half the record ({most_allowed_s:.3} s) at the latest",
+        short(*.least_s), short(*.most_s)
     )]
     DeadTimeRange {
         /// Lower end \[s\].
@@ -67,8 +69,8 @@ pub enum FitError {
     },
     /// The dead time ran into the end of its range.
     #[error(
-        "the dead time runs against the {end} end of its range, {bound_s} s; widen the range, or \
-         look whether input and output are on one clock"
+        "the dead time runs against the {end} end of its range, {} s; widen the range, or \
+         look whether input and output are on one clock", short(*.bound_s)
     )]
     DeadTimeAtBound {
         /// `lower` or `upper`.

@@ -3,6 +3,7 @@
 
 use super::clipped::Clipped;
 use super::settings::Before;
+use crate::identify::number::short;
 
 /// Size that no sample reaches; larger ones would overflow where they are
 /// squared and multiplied.
@@ -29,8 +30,8 @@ pub enum SamplesError {
     },
     /// A sample that is no number.
     #[error(
-        "the {what} is {value} at sample {at}, which nothing that is measured can be; cut the data \
-         there or mend it first"
+        "the {what} is {} at sample {at}, which nothing that is measured can be; cut the data \
+         there or mend it first", short(*.value)
     )]
     NotFinite {
         /// `input` or `output`.
@@ -47,7 +48,10 @@ pub enum SamplesError {
         dt_s: f64,
     },
     /// An input that never changes.
-    #[error("the input is {value} throughout; a model can be told only from an input that changes")]
+    #[error(
+        "the input is {} throughout; a model can be told only from an input that changes",
+        short(*.value)
+    )]
     ConstantInput {
         /// Its value.
         value: f64,
@@ -64,7 +68,7 @@ pub enum SamplesError {
         level: f64,
     },
     /// An output that never changes.
-    #[error("the output is {value} throughout; look whether the sensor was on")]
+    #[error("the output is {} throughout; look whether the sensor was on", short(*.value))]
     ConstantOutput {
         /// Its value.
         value: f64,

@@ -5,6 +5,9 @@ use std::fmt::Write;
 use super::{Study, form};
 use crate::identify::fit::{Fit, Note, Row};
 
+/// Least width of the names of forms.
+const NAME: usize = 10;
+
 /// A short table.
 pub fn text(study: &Study) -> String {
     let mut text = String::new();
@@ -46,13 +49,15 @@ fn data(text: &mut String, study: &Study) {
 fn compared(text: &mut String, study: &Study) {
     let rows = &study.comparison.rows;
     if rows.len() > 1 {
+        let names = rows.iter().map(|row| form(row.settings.structure).len());
+        let width = names.fold(NAME, usize::max) + 1;
         let line = format!(
-            "{:<11}{:>10}{:>10}{:>13}{:>12}",
+            "{:<width$}{:>10}{:>10}{:>13}{:>12}",
             "form", "parameters", "fit %", "validation %", "BIC"
         );
         put(text, "compared", &line);
         for row in rows {
-            put(text, "", &one(row));
+            put(text, "", &one(row, width));
         }
         put(
             text,
@@ -64,17 +69,17 @@ fn compared(text: &mut String, study: &Study) {
     }
 }
 
-fn one(row: &Row) -> String {
+fn one(row: &Row, width: usize) -> String {
     let name = form(row.settings.structure);
     match &row.fit {
-        Err(why) => format!("{name:<11}{why}"),
+        Err(why) => format!("{name:<width$}{why}"),
         Ok(fit) => {
             let number = |value: Option<f64>, digits: usize| {
                 value.map_or_else(|| "–".to_owned(), |value| format!("{value:.digits$}"))
             };
             let loose = if fit.is_determined() { "" } else { "  not determined by the data" };
             format!(
-                "{name:<11}{:>10}{:>10.2}{:>13}{:>12}{loose}",
+                "{name:<width$}{:>10}{:>10.2}{:>13}{:>12}{loose}",
                 fit.estimated,
                 fit.quality.fit_percent,
                 number(row.validation.map(|quality| quality.fit_percent), 2),

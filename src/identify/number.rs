@@ -1,0 +1,33 @@
+//! Numbers as sentences give them.
+
+/// A value to six digits, without the tail that arithmetic leaves.
+pub fn short(value: f64) -> String {
+    let size = value.abs();
+    if size == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let rounded = format!("{value:.5e}");
+    let Ok(rounded) = rounded.parse::<f64>() else { return rounded };
+    if (1e-4..1e7).contains(&size) { rounded.to_string() } else { format!("{rounded:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_arithmetic_leaves_is_not_read() {
+        for (value, told) in [
+            (59.999_999_999_999_99, "60"),
+            (0.1 + 0.2, "0.3"),
+            (-35.25, "-35.25"),
+            (123_456.7, "123457"),
+            (1e300, "1e300"),
+            (-1.23e-7, "-1.23e-7"),
+            (0.0, "0"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(short(value), told);
+        }
+    }
+}
