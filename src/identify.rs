@@ -11,6 +11,7 @@ pub mod flow;
 pub mod grid;
 pub mod hampel;
 pub mod library;
+pub mod number;
 pub mod prbs;
 pub mod profile;
 pub mod quantity;

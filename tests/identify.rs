@@ -1,4 +1,4 @@
-//! `truebead excite`, `identify` and `models`: from a profile to a model that a
+//! `truebead identify` and `models`: from a log to a model that a
 //! cell can look up, and what bad data are answered with.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use truebead::identify::file;
-use truebead::identify::profile::file::parse;
 use truebead::sim::logged;
 
 fn truebead(args: &[&str]) -> Command {
@@ -161,41 +160,6 @@ fn no_model_is_replaced() {
     assert!(other.contains("another model for the same") && other.contains("other/model.toml"));
     assert_eq!(fs::read_to_string(&kept).unwrap(), text);
     assert_eq!(fs::read_dir(&library).unwrap().count(), 1);
-}
-
-#[test]
-fn profiles_are_written_as_a_cell_plays_them() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("profile.csv");
-    let excite = |args: &str| {
-        let mut command = truebead(&["excite"]);
-        command.args(args.split(' ')).arg("--out").arg(&out);
-        command
-    };
-    let answer = said(
-        &mut excite(
-            "prbs --low 20 --high 40 --bit-s 0.7 --lead-in-s 5 --lead-out-s 3 --quantity screw_rpm",
-        ),
-        0,
-    );
-    assert!(answer.contains("129 values of screw_rpm, 96.9 s"), "{answer}");
-    assert!(answer.contains("20 to 40 rpm") && answer.contains("0.0112 to 0.633 Hz"), "{answer}");
-    let (profile, _) = parse(&fs::read_to_string(&out).unwrap()).unwrap();
-    assert_eq!([profile.at(4.9), profile.at(5.1), profile.at(96.0)], [30.0, 40.0, 30.0]);
-    let gaussian = "gaussian --low 2 --high 4 --hold-s 1.5 --duration-s 90 --quantity drive_v";
-    assert!(said(&mut excite(gaussian), 0).contains("60 values of drive_v, 90.0 s"));
-    let steps = "steps --levels 20,40,30 --hold-s 15 --quantity rpm";
-    assert!(said(&mut excite(steps), 0).contains("20 to 40 rpm"));
-    let unit = said(&mut excite("steps --levels 1,2 --hold-s 1 --quantity speed"), 2);
-    assert!(unit.contains("ends with its unit"), "{unit}");
-    let endless = said(&mut excite("gaussian --low 2 --high 4 --hold-s 1 --quantity drive_v"), 2);
-    assert!(endless.contains("tell --duration-s"), "{endless}");
-    let one = said(&mut excite("steps --levels 20 --hold-s 15 --quantity rpm"), 2);
-    assert!(one.contains("1 level: a step takes two"), "{one}");
-    let same = said(&mut excite("steps --levels 20,20 --hold-s 15 --quantity rpm"), 2);
-    assert!(same.contains("20 from the beginning to the end"), "{same}");
-    let flat = said(&mut excite("prbs --low 4 --high 4 --hold-s 1 --quantity rpm"), 2);
-    assert!(flat.contains("levels from 4 to 4"), "{flat}");
 }
 
 #[test]

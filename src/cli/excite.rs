@@ -6,10 +6,17 @@ use anyhow::Result;
 use clap::{Args, Subcommand};
 
 use super::WrongArguments;
+use super::outcome::refuse_replacing;
 use crate::identify::excitation::{Excitation, Shape};
+use crate::identify::number::short;
 use crate::identify::profile::{Profile, file};
 use crate::identify::quantity::{Quantity, Unit};
 use crate::io::whole_file::write_whole;
+
+/// Levels held for less are a slip of the unit \[s\].
+const SHORTEST_S: f64 = 1e-3;
+/// How often a cell tells its extruder something, unless it says otherwise \[s\].
+const USUAL_PERIOD_S: f64 = 0.02;
 
 /// Writes a profile that excites an extruder, so that its model can be found.
 ///
@@ -108,7 +115,7 @@ struct All {
     /// What is commanded: the column's name, which ends with its unit (see the examples)
     #[arg(long, value_name = "NAME")]
     quantity: String,
-    /// File to write
+    /// File to write; one that is there already is refused
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
 }
@@ -137,6 +144,7 @@ pub fn run(args: &ExciteArgs) -> Result<()> {
         }
     };
     all.check()?;
+    refuse_replacing(&all.out, "file")?;
     let excitation = Excitation { shape, hold_s: all.hold_s, duration_s: all.duration_s };
     let profile = excitation
         .profile()
@@ -144,7 +152,8 @@ pub fn run(args: &ExciteArgs) -> Result<()> {
         .map_err(WrongArguments::new)?;
     let band = excitation.band_hz().map_err(WrongArguments::new)?;
     write_whole(&all.out, file::to_csv(&profile, &all.quantity).as_bytes())?;
-    tell(&profile, band, &all.quantity, &all.out);
+    tell(&profile, &all.quantity, &all.out);
+    tell_band(&excitation, band);
     Ok(())
 }
 
@@ -158,6 +167,14 @@ impl All {
                 units.join(", ")
             )));
         }
+        self.check_commanded()?;
+        if self.hold_s < SHORTEST_S {
+            return Err(WrongArguments::new(format!(
+                "--hold-s {}: expected {SHORTEST_S} s or more: no extruder is told so often, and none \
+                 answers so fast",
+                self.hold_s
+            )));
+        }
         for (name, value) in [("--lead-in-s", self.lead_in_s), ("--lead-out-s", self.lead_out_s)] {
             if !(0.0..=86_400.0).contains(&value) {
                 let what = format!("{name} {value}: expected 0 to 86400 s");
@@ -168,21 +185,52 @@ impl All {
     }
 }
 
+impl All {
+    /// What an extruder lays is not what it is told.
+    fn check_commanded(&self) -> Result<(), WrongArguments> {
+        match Unit::of_column(&self.quantity) {
+            Some(unit @ (Unit::Mm | Unit::Mm2)) => Err(WrongArguments::new(format!(
+                "--quantity {}: no extruder is told a {}; that is what comes of it. Expected what is \
+                 commanded, such as screw_rpm, drive_v, nozzle_mpa or flow_mm3_per_s",
+                self.quantity,
+                if unit == Unit::Mm { "width or a length" } else { "section" }
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// The shortest sequence that does not repeat itself, from 7 bits on.
 fn bits_for(all: &All) -> u32 {
     let bits = all.duration_s.unwrap_or(0.0) / all.hold_s;
     (7..16).find(|n| f64::from((1_u32 << n) - 1) >= bits).unwrap_or(16)
 }
 
-fn tell(profile: &Profile, (low_hz, high_hz): (f64, f64), column: &str, out: &Path) {
+fn tell(profile: &Profile, column: &str, out: &Path) {
     let unit = Unit::of_column(column).map_or("", Unit::symbol);
     let (low, high) = profile.range();
     let (count, end_s) = (profile.points().len(), profile.end_s());
     say!("profile    {}: {count} values of {column}, {end_s:.1} s", out.display());
     say!("values     {} to {} {unit}", short(low), short(high));
-    say!("excites    {low_hz:.4} to {high_hz:.3} Hz with half of its power density or more");
 }
 
-fn short(value: f64) -> f64 {
-    (value * 1e4).round() / 1e4
+/// Which frequencies it excites. Stairs excite most what is slowest, and what is
+/// held a few times only has no band of its own.
+fn tell_band(excitation: &Excitation, (low_hz, high_hz): (f64, f64)) {
+    let hold_s = short(excitation.hold_s);
+    if matches!(excitation.shape, Shape::Stairs(_)) || low_hz >= high_hz {
+        say!(
+            "excites    up to {high_hz:.4} Hz, what is slow the most: for an extruder that has come \
+             to rest {hold_s} s after a step"
+        );
+    } else {
+        say!("excites    {low_hz:.4} to {high_hz:.4} Hz with half of its power density or more");
+    }
+    if excitation.hold_s < USUAL_PERIOD_S {
+        say!(
+            "hint       each level holds for {hold_s} s: set io_rate_hz of the cell to {:.0} or more, \
+             so that none is left out",
+            (1.0 / excitation.hold_s).ceil()
+        );
+    }
 }

@@ -11,7 +11,6 @@ use signal_hook::iterator::Signals;
 
 use super::WrongArguments;
 use super::cell::LoadedCell;
-use super::run::parse_seconds;
 use crate::config::cell::{ExtruderPart, Purpose};
 use crate::io::clock::RunClock;
 use crate::io::extruder_sim::{ExtruderOptions, ExtruderSim};
@@ -47,7 +46,8 @@ pub struct ExtruderSimArgs {
     #[arg(long, default_value = "truebead-sim")]
     name: String,
     /// To rehearse a fault: the pump fails so long after it was first told to run [s]
-    #[arg(long, value_name = "S", value_parser = parse_seconds)]
+    #[arg(long, value_name = "S", value_parser = parse_until,
+          allow_hyphen_values = true)]
     fail_after_s: Option<f64>,
 }
 
@@ -67,6 +67,12 @@ pub fn run(args: &ExtruderSimArgs) -> anyhow::Result<()> {
     sim.stop();
     tell!("ended");
     Ok(())
+}
+
+/// Time until a rehearsed fault.
+fn parse_until(text: &str) -> Result<f64, String> {
+    let seconds = text.trim().parse().ok().filter(|seconds| (0.0..=1e7).contains(seconds));
+    seconds.ok_or_else(|| "expected seconds after the start of the pump, 0 to 1e7".to_owned())
 }
 
 fn options(args: &ExtruderSimArgs, loaded: &LoadedCell) -> anyhow::Result<ExtruderOptions> {

@@ -37,25 +37,31 @@ pub struct RobotSimArgs {
     #[arg(long, default_value = "truebead-sim", value_parser = parse_name)]
     name: String,
     /// Slowest setpoint that it takes [mm/s]
-    #[arg(long, value_name = "MM/S", default_value = "60", value_parser = parse_speed)]
+    #[arg(long, value_name = "MM/S", default_value = "60", value_parser = parse_speed,
+          allow_hyphen_values = true)]
     min: MmPerS,
     /// Fastest setpoint that it takes [mm/s]
-    #[arg(long, value_name = "MM/S", default_value = "150", value_parser = parse_speed)]
+    #[arg(long, value_name = "MM/S", default_value = "150", value_parser = parse_speed,
+          allow_hyphen_values = true)]
     max: MmPerS,
     /// Speed to which it goes when setpoints run out [mm/s]
-    #[arg(long, value_name = "MM/S", default_value = "60", value_parser = parse_speed)]
+    #[arg(long, value_name = "MM/S", default_value = "60", value_parser = parse_speed,
+          allow_hyphen_values = true)]
     hold: MmPerS,
     /// Speed at which it begins a bead [mm/s]
-    #[arg(long, value_name = "MM/S", default_value = "112.5", value_parser = parse_speed)]
+    #[arg(long, value_name = "MM/S", default_value = "112.5", value_parser = parse_speed,
+          allow_hyphen_values = true)]
     start: MmPerS,
     /// Bandwidth of its velocity loop [Hz]
-    #[arg(long, value_name = "HZ", default_value = "10")]
+    #[arg(long, value_name = "HZ", default_value = "10", allow_hyphen_values = true)]
     bandwidth_hz: f64,
     /// Largest acceleration along the path [mm/s²]
-    #[arg(long, value_name = "MM/S2", default_value = "2000", value_parser = parse_accel)]
+    #[arg(long, value_name = "MM/S2", default_value = "2000", value_parser = parse_accel,
+          allow_hyphen_values = true)]
     accel: MmPerS2,
     /// Length of a bead, after which it is IDLE [mm]
-    #[arg(long, value_name = "MM", default_value = "2000", value_parser = parse_length)]
+    #[arg(long, value_name = "MM", default_value = "2000", value_parser = parse_length,
+          allow_hyphen_values = true)]
     bead_mm: Mm,
     /// Lays one bead without end
     #[arg(long, conflicts_with_all = ["bead_mm", "layers"])]
@@ -64,10 +70,12 @@ pub struct RobotSimArgs {
     #[arg(long, value_name = "N", default_value = "1")]
     layers: u32,
     /// By how much each bead lies above the one before [mm]
-    #[arg(long, value_name = "MM", default_value = "20", value_parser = parse_length)]
+    #[arg(long, value_name = "MM", default_value = "20", value_parser = parse_layer,
+          allow_hyphen_values = true)]
     layer_height_mm: Mm,
     /// Pause before each bead [s]
-    #[arg(long, value_name = "S", default_value = "1", value_parser = parse_pause)]
+    #[arg(long, value_name = "S", default_value = "1", value_parser = parse_pause,
+          allow_hyphen_values = true)]
     pause_s: Span,
     /// Time between two STATE lines [ms]
     #[arg(long, value_name = "MS", default_value = "20",
@@ -136,6 +144,13 @@ fn parse_accel(text: &str) -> Result<MmPerS2, String> {
 
 fn parse_length(text: &str) -> Result<Mm, String> {
     parse(text, Mm::new)
+}
+
+fn parse_layer(text: &str) -> Result<Mm, String> {
+    parse_length(text)
+        .ok()
+        .filter(|height| *height >= Mm::ZERO)
+        .ok_or_else(|| "expected 0 mm or more".to_owned())
 }
 
 fn parse_pause(text: &str) -> Result<Span, String> {
