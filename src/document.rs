@@ -115,7 +115,7 @@ impl<'a> Table<'a> {
     }
 
     /// Reports the absence of a key, unless the table may be incomplete.
-    fn absent(&self, key: &'static str, expected: impl Into<String>) {
+    pub fn absent(&self, key: &'static str, expected: impl Into<String>) {
         if self.strict {
             self.report(key, "nothing", expected);
         }
@@ -254,7 +254,12 @@ impl<'a> Table<'a> {
         counts: &[usize],
         range: RangeInclusive<f64>,
     ) -> Option<Vec<f64>> {
-        let lengths = counts.iter().map(usize::to_string).collect::<Vec<_>>().join(" or ");
+        let lengths = match counts {
+            [first, _, .., last] if counts.windows(2).all(|pair| pair[0] + 1 == pair[1]) => {
+                format!("{first} to {last}")
+            }
+            _ => counts.iter().map(usize::to_string).collect::<Vec<_>>().join(" or "),
+        };
         let expected = format!("{lengths} numbers in brackets, each {}", expected_number(&range));
         let Some(value) = self.get(key) else {
             self.absent(key, expected);

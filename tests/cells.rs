@@ -81,3 +81,26 @@ fn a_single_scale_may_have_a_standard_deviation_smaller_than_itself() {
     let said = Cell::parse(Path::new("cell.toml"), &of_a_file, Purpose::Measure).unwrap_err();
     assert!(said.to_string().contains("expected mm_per_px beside it"), "{said}");
 }
+
+#[test]
+fn one_model_is_named_or_looked_up_and_a_linear_plant_has_its_coefficients() {
+    let text = fs::read_to_string(root().join("cells/extruder-feedforward.toml")).unwrap();
+    let said = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        let text = text.replace(from, to);
+        Cell::parse(Path::new("cell.toml"), &text, Purpose::Run).unwrap_err().to_string()
+    };
+    let both = said("library = \"../models\"", "model = \"a.toml\"\nlibrary = \"../models\"");
+    let beside = said("library = \"../models\"", "model = \"a.toml\"");
+    assert!(both.contains("extruder.library: found a library beside a model"), "{both}");
+    for said in [both, beside] {
+        assert!(said.contains("extruder.nozzle_mm: found a key of a library beside a model"));
+        assert!(!said.contains("unknown key"), "{said}");
+    }
+    let neither = said("library = \"../models\"", "");
+    assert!(neither.contains("extruder.library: found nothing, expected the folder"), "{neither}");
+    assert!(!neither.contains("unknown key"), "{neither}");
+    let bare = said("numerator = [18.0]\n", "");
+    let expected = "extruder_plant.numerator: found nothing, expected the coefficients of a linear";
+    assert!(bare.contains(expected), "{bare}");
+}

@@ -151,6 +151,21 @@ impl ExtruderPlant {
 }
 
 fn read_transfer(table: &Table<'_>) -> Option<TransferFunction> {
+    for (key, what) in [
+        (
+            "numerator",
+            "the coefficients of a linear plant's numerator, the highest power of s \
+                       first, such as [18.0]",
+        ),
+        ("denominator", "those of its denominator, such as [0.656, 0.975, 1.0]"),
+    ] {
+        if !table.has(key) {
+            table.absent(key, what);
+        }
+    }
+    if !(table.has("numerator") && table.has("denominator")) {
+        return None;
+    }
     let num = table.row("numerator", &COUNTS, ANY);
     let den = table.row("denominator", &COUNTS, ANY);
     let dead_time = table.number_or("dead_time_s", 0.0..=1e3, 0.0);

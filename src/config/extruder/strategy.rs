@@ -161,6 +161,13 @@ fn read_feedforward(table: &Table<'_>, about: &About<'_>) -> Option<FeedforwardK
     })
 }
 
+/// What a model is looked up by in a library.
+const LOOKED_UP_BY: [&str; 4] =
+    ["material", "nozzle_mm", "temperature_c", "temperature_tolerance_c"];
+
+const MODEL_OR_LIBRARY: &str = "the file of a model, library with material, nozzle_mm and \
+                                temperature_c, or mm3_per_turn";
+
 /// A screw or a wheel in place of a model.
 fn read_turn(table: &Table<'_>, about: &About<'_>) -> Option<DragFlow> {
     let volume = table.number("mm3_per_turn", 1e-6..=1e12);
@@ -181,9 +188,16 @@ fn read_model(table: &Table<'_>, about: &About<'_>) -> Option<ModelSource> {
         return read_turn(table, about).map(ModelSource::Screw);
     }
     match (table.has("model"), table.has("library")) {
-        (true, true) => {
-            table.report("library", "a library beside a model", "one of model and library");
-            None
+        (true, with_library) => {
+            if with_library {
+                table.report("library", "a library beside a model", "one of model and library");
+            }
+            for key in LOOKED_UP_BY.into_iter().filter(|key| table.has(key)) {
+                let expected = "nothing here: model names one file, and this looks one up in a \
+                                library; give library in place of model, or leave this out";
+                table.report(key, "a key of a library beside a model", expected);
+            }
+            table.text("model").map(|file| ModelSource::File(about.folder.join(file)))
         }
         (false, true) => {
             let folder = about.folder.join(table.text("library")?);
@@ -201,6 +215,14 @@ fn read_model(table: &Table<'_>, about: &About<'_>) -> Option<ModelSource> {
             };
             Some(ModelSource::Library { folder, wanted })
         }
-        (_, false) => table.text("model").map(|file| ModelSource::File(about.folder.join(file))),
+        (false, false) => {
+            let named = LOOKED_UP_BY.into_iter().filter(|key| table.has(key)).count();
+            if named > 0 {
+                table.absent("library", "the folder in which a model for these is looked up");
+            } else {
+                table.absent("model", MODEL_OR_LIBRARY);
+            }
+            None
+        }
     }
 }
