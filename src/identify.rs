@@ -1,6 +1,7 @@
 //! Models of an extruder from logged data: what to excite it with, how the
 //! data are cleaned and aligned, and how models are fitted to them.
 
+pub mod ahead;
 pub mod align;
 pub mod band;
 pub mod excitation;

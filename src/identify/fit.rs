@@ -27,6 +27,7 @@
 
 mod clipped;
 mod compare;
+mod drift;
 mod error;
 mod levenberg;
 mod loose;
@@ -38,6 +39,7 @@ mod samples;
 mod settings;
 mod spread;
 mod start;
+mod trend;
 
 pub use clipped::{Clipped, Column, End};
 pub use compare::{Comparison, Row, compare};
@@ -47,6 +49,7 @@ pub use quality::Quality;
 pub use report::{Fit, Note, Parameter};
 pub use samples::{Samples, SamplesError};
 pub use settings::{Before, DeadTime, Level, Settings, Structure};
+pub use trend::Trend;
 
 use crate::model::Between;
 use problem::Problem;

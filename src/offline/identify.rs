@@ -2,10 +2,12 @@
 //! files that tell it.
 
 mod curves;
+mod doubts;
 mod json;
 mod page;
 mod table;
 
+use crate::identify::ahead::{Ahead, ahead};
 use crate::identify::experiment::Experiment;
 use crate::identify::file::{self, ModelFile, Setting, Uncertainty};
 use crate::identify::fit::{
@@ -20,13 +22,6 @@ pub use self::json::to_json;
 pub use self::page::page;
 pub use self::table::text;
 
-/// A model that is further off other data than off its own by this factor is
-/// told. Errors are compared and not fits, which grow with the excitation.
-const OVERFIT: f64 = 1.25;
-/// A fit below this is told \[%\].
-const POOR_PERCENT: f64 = 50.0;
-/// Data that validate last at least so many of the slowest time constants.
-const TIME_CONSTANTS: f64 = 5.0;
 /// Lags of the residuals that are looked at, at most.
 const LAGS: usize = 300;
 
@@ -79,7 +74,7 @@ pub enum Refusal {
     #[error(
         "the model ({form}, {estimation:.1} % on its own data) does not foretell the data to \
          validate with: {validation:.1} %, no better than their mean. Are both of the same machine \
-         and material, and is the input the one that moves the output?"
+         and material, and is the input the one that moves the output?{}", further(.drift.as_ref())
     )]
     Foretells {
         /// Its form.
@@ -88,13 +83,35 @@ pub enum Refusal {
         estimation: f64,
         /// Fit to the others \[%\].
         validation: f64,
+        /// What is said of a drift in what the model leaves of its own data.
+        drift: Option<String>,
     },
+    /// The output moves before the input does.
+    #[error(
+        "the output answers the input some {:.2} s before it comes: a model that may do so fits to \
+         {:.1} %, the best that does not to {:.1} %. Are both on one clock, each sample with the \
+         moment at which it was taken? A closed loop that moves the input after the output looks the \
+         same", .0.ahead_s, .0.fit_percent, .0.answering_percent
+    )]
+    Ahead(Ahead),
 }
 
+/// A line for each reason, before it the forms that it holds for.
 fn lines(refused: &[(String, String)]) -> String {
+    let mut lines: Vec<(String, &str)> = Vec::new();
+    for (form, why) in refused {
+        match lines.iter_mut().find(|(_, said)| said == why) {
+            Some((forms, _)) => *forms = format!("{forms}, {form}"),
+            None => lines.push((form.clone(), why)),
+        }
+    }
     let lines: Vec<String> =
-        refused.iter().map(|(form, why)| format!("\n  {form}: {why}")).collect();
+        lines.iter().map(|(forms, why)| format!("\n  {forms}: {why}")).collect();
     lines.concat()
+}
+
+fn further(sentence: Option<&String>) -> String {
+    sentence.map_or_else(String::new, |sentence| format!(" Further, {sentence}"))
 }
 
 /// A form by the word that the command takes for it.
@@ -123,6 +140,10 @@ pub fn study(logs: Logs, forms: &[Settings]) -> Result<Study, Refusal> {
     let others = validation.as_ref().map(|samples| (samples, before_validation));
     let comparison = compare(&estimation, others, &forms);
     let chosen = comparison.chosen.and_then(|at| comparison.rows.get(at));
+    let fits = chosen.and_then(|row| row.fit.as_ref().ok());
+    if let Some(ahead) = forms.first().and_then(|form| ahead(&estimation, form, fits)) {
+        return Err(Refusal::Ahead(ahead));
+    }
     let Some((Ok(fit), quality)) = chosen.map(|row| (row.fit.clone(), row.validation)) else {
         return Err(Refusal::None(comparison.rows.iter().map(refused).collect()));
     };
@@ -131,6 +152,7 @@ pub fn study(logs: Logs, forms: &[Settings]) -> Result<Study, Refusal> {
             form: form(fit.settings.structure),
             estimation: fit.quality.fit_percent,
             validation: quality.fit_percent,
+            drift: doubts::of_drift(&fit, &logs),
         });
     }
     let foretold = others.and_then(|(samples, before)| fit.predict(samples, before).ok());
@@ -175,61 +197,6 @@ impl Study {
         1.0 / slowest
     }
 
-    fn doubts(&self) -> Vec<String> {
-        let mut doubts: Vec<String> =
-            self.logs.estimation.notes.iter().map(|note| format!("data: {note}")).collect();
-        if let Some((data, from)) = &self.logs.validation {
-            doubts.extend(data.notes.iter().map(|note| format!("{from}: {note}")));
-        }
-        doubts.extend(self.fit.notes.iter().map(of_note));
-        let own = self.fit.quality.fit_percent;
-        if own < POOR_PERCENT {
-            doubts.push(format!(
-                "the model explains little of the data ({own:.1} % fit): look for what else moves \
-                 the output, or filter it with --hampel and --smooth"
-            ));
-        }
-        match self.validation {
-            None => doubts.push(
-                "nothing was validated with: a fit to its own data says little; give --validate or \
-                 --validate-share"
-                    .to_owned(),
-            ),
-            Some(other) if other.rmse > OVERFIT * self.fit.quality.rmse => doubts.push(format!(
-                "the model is {:.1} times as far off the data to validate with as off its own: take \
-                 fewer poles and zeros, log longer, or look whether the machine has changed",
-                other.rmse / self.fit.quality.rmse
-            )),
-            Some(_) => {}
-        }
-        doubts.extend(self.short_validation());
-        let outside = self.residuals.share_outside();
-        if outside > 0.05 {
-            doubts.push(format!(
-                "what the model leaves hangs together ({:.0} % of the lags outside the 99 % band; the \
-                 {} samples say as much as {:.0} independent ones): the noise is coloured, or \
-                 something is missing in the model; the standard errors allow for it",
-                100.0 * outside,
-                self.fit.residuals.len(),
-                self.fit.independent_samples
-            ));
-        }
-        doubts
-    }
-
-    fn short_validation(&self) -> Option<String> {
-        let (data, _) = self.logs.validation.as_ref()?;
-        let needed_s = TIME_CONSTANTS * self.slowest_s() + self.fit.model.dead_time_s();
-        (data.duration_s() < needed_s).then(|| {
-            format!(
-                "the {:.1} s to validate with are short for a time constant of {:.2} s: {needed_s:.1} \
-                 s or more would tell",
-                data.duration_s(),
-                self.slowest_s()
-            )
-        })
-    }
-
     /// The model as a file keeps it.
     pub fn model(&self, setting: Setting) -> ModelFile {
         let fit = &self.fit;
@@ -271,22 +238,6 @@ impl Study {
             _ if name.ends_with("_s") => "s".to_owned(),
             _ => String::new(),
         }
-    }
-}
-
-fn of_note(note: &Note) -> String {
-    match note {
-        Note::NoDeadTime => "no dead time shows; it was left out".to_owned(),
-        Note::PolesAreReal => {
-            "the damping is above 1: both poles are real; --model sopdt-real gives \
-                               their time constants"
-                .to_owned()
-        }
-        Note::DeadTimeToAStep { dead_time_s } => format!(
-            "the dead time of {dead_time_s:.4} s is told to a whole step only: the form passes its \
-             input straight through"
-        ),
-        Note::Undetermined(loose) => loose.to_string(),
     }
 }
 

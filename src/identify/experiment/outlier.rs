@@ -62,7 +62,7 @@ mod tests {
         let both = with(&[(7, 1e300), (9, -1e300)]).unwrap_err().to_string();
         assert!(both.contains("the farthest of 2"), "{both}");
         let said = with(&[(7, 1e6), (2000, 9e5), (2900, -2e5)]).unwrap_err().to_string();
-        assert!(said.contains("is 1e6 at sample 8 (the farthest of 3)"), "{said}");
+        assert!(said.contains("is 1000000 at sample 8 (the farthest of 3)"), "{said}");
     }
 
     #[test]

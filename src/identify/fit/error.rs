@@ -67,6 +67,23 @@ pub enum FitError {
         /// Length of the record \[s\].
         record_s: f64,
     },
+    /// An output that drifts, and a model that follows the drift.
+    #[error(
+        "the output drifts: a straight line in time explains {share_percent:.1} % of it ({} by {} \
+         over {record_s:.1} s) and not the input, and the model follows that line. Hold temperature \
+         and feed steady, use a part without the drift (--from-s, --to-s), or take the line out of \
+         the log; an extruder that is so slow takes a longer log", if *.rise > 0.0 { "up" } else {
+            "down"
+        }, short(.rise.abs())
+    )]
+    Drift {
+        /// Share of the output's variance that the line explains \[%\].
+        share_percent: f64,
+        /// By how much it rises over the record, in units of the output.
+        rise: f64,
+        /// Length of the record \[s\].
+        record_s: f64,
+    },
     /// The dead time ran into the end of its range.
     #[error(
         "the dead time runs against the {end} end of its range, {} s; widen the range, or \

@@ -42,6 +42,13 @@ pub enum Loose {
         /// Its standard error; infinite where nothing holds it.
         sigma: f64,
     },
+    /// The dead time may be none, or several time constants.
+    DeadTime {
+        /// The dead time \[s\].
+        dead_time_s: f64,
+        /// Its standard error \[s\]; infinite where nothing holds it.
+        sigma_s: f64,
+    },
     /// Parameters of which one makes up for a change of the others.
     Together {
         /// Their names.
@@ -71,6 +78,11 @@ impl fmt::Display for Loose {
                 "the data do not tell the gain: {gain:.2e} with a standard error of {sigma:.2e} \
                  may be none at all. Look whether the output answers the input, and whether \
                  something else held it (a closed loop does)"
+            ),
+            Self::DeadTime { dead_time_s, sigma_s } => write!(
+                f,
+                "the data do not tell the dead time: {dead_time_s:.3} s with a standard error of \
+                 {sigma_s:.3} s, longer than itself and than the fastest time constant"
             ),
             Self::Together { names, pair } => {
                 match names.split_last() {
@@ -116,9 +128,23 @@ pub(super) fn loose(
     if sigma.is_nan() || SEEN_SIGMAS * sigma >= gain.abs() {
         return Some(Loose::Gain { gain, sigma });
     }
+    if let Some(late) = loose_dead_time(problem, theta, spread) {
+        return Some(late);
+    }
     let direction = spread.loose.as_ref()?;
     let names = together(direction, named, turn);
     Some(Loose::Together { names, pair: pair(problem, theta) })
+}
+
+/// A dead time whose standard error is beyond itself and beyond the fastest time
+/// constant, which no controller could go by.
+fn loose_dead_time(problem: &Problem, theta: &[f64], spread: &Spread) -> Option<Loose> {
+    let place = problem.layout().dead_time?;
+    let (dead_time_s, sigma_s) = (theta[place], spread.coloured[(place, place)].max(0.0).sqrt());
+    let poles = polynomial::roots(&problem.den(theta));
+    let fastest_s = poles.iter().map(|pole| 1.0 / pole.norm()).fold(f64::INFINITY, f64::min);
+    let is_loose = sigma_s.is_nan() || sigma_s > dead_time_s.max(fastest_s);
+    is_loose.then_some(Loose::DeadTime { dead_time_s, sigma_s })
 }
 
 /// The reported parameters that move along the direction which nothing holds.

@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use super::drift::check_drift;
 use super::error::FitError;
 use super::levenberg::{Outcome, nearest};
 use super::loose::{Loose, loose};
@@ -151,6 +152,7 @@ pub(super) fn report(
     }
     check_stable(problem, best)?;
     let fit = assemble(problem, settings, best)?;
+    check_drift(problem, &fit)?;
     check_dependence(problem, &fit)?;
     if settings.accept_undetermined {
         return Ok(fit);

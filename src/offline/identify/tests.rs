@@ -109,3 +109,55 @@ fn one_log_alone_is_warned_of() {
     let page = page(&found);
     assert!(!page.contains("What it was validated with"));
 }
+
+/// The example's log with its flow changed, from time \[s\] and flow.
+fn with(more: impl Fn(f64, f64) -> f64) -> Experiment {
+    let mut log = logged::binary().unwrap();
+    for (time_s, flow) in log.time_s.iter().zip(&mut log.flow_mm3_per_s) {
+        *flow = more(*time_s, *flow);
+    }
+    experiment(&log)
+}
+
+#[test]
+fn a_drift_is_no_answer() {
+    let forms = [
+        settings(Structure::FirstOrder { zero: false }),
+        settings(Structure::SecondOrderOscillating { zero: false }),
+    ];
+    for slope in [2.0, -5.0] {
+        // The output's own noise about a line.
+        let drifting = with(|time_s, flow| 500.0 + slope * time_s + 0.02 * (flow - 540.0));
+        let (first, rest) = drifting.split(0.3).unwrap();
+        let said = study(logs(first, Some(rest)), &forms).unwrap_err().to_string();
+        assert!(said.contains("the output drifts: a straight line in time explains"), "{said}");
+        assert!(said.contains(if slope > 0.0 { "(up by 13" } else { "(down by 34" }), "{said}");
+    }
+}
+
+#[test]
+fn a_drift_beside_the_answer_is_told() {
+    let drifting = with(|time_s, flow| flow + time_s);
+    let found =
+        study(logs(drifting, None), &[settings(Structure::SecondOrderOscillating { zero: false })]);
+    let warnings = found.unwrap().warnings;
+    let drift = warnings.iter().find(|warning| warning.contains("the output drifts up by"));
+    assert!(drift.unwrap().contains("--from-s, --to-s"), "{warnings:?}");
+}
+
+#[test]
+fn an_output_on_a_clock_that_is_behind_is_refused() {
+    let mut log = logged::binary().unwrap();
+    log.flow_mm3_per_s.rotate_left(50);
+    let forms = [settings(Structure::SecondOrderOscillating { zero: false })];
+    let said = study(logs(experiment(&log), None), &forms).unwrap_err().to_string();
+    assert!(said.starts_with("the output answers the input some 0."), "{said}");
+    assert!(said.contains("Are both on one clock"), "{said}");
+}
+
+#[test]
+fn forms_that_are_refused_alike_are_told_once() {
+    let one = |form: &str, why: &str| (form.to_owned(), why.to_owned());
+    let refusal = Refusal::None(vec![one("fopdt", "a"), one("3,2", "b"), one("sopdt", "a")]);
+    assert_eq!(refusal.to_string(), "no model can be trusted:\n  fopdt, sopdt: a\n  3,2: b");
+}

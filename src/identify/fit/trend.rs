@@ -1,0 +1,108 @@
+//! A straight line in time through a row: how much of it is drift.
+
+use super::spread::Colour;
+
+/// Least F ratio at which a line is more than chance.
+const SEEN: f64 = 15.0;
+/// A smaller share of a row is of no account.
+const SMALL: f64 = 0.1;
+
+/// The line that is nearest to a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trend {
+    /// Share of the row's variance that it explains, 0 to 1.
+    pub share: f64,
+    /// By how much it rises from the first sample to the last.
+    pub rise: f64,
+    /// Sum of squares about the line.
+    pub squares: f64,
+}
+
+impl Trend {
+    /// Of a row at even times; of fewer than two samples there is none.
+    pub fn of(row: &[f64]) -> Self {
+        let n = as_f64(row.len().max(1));
+        let mean = row.iter().sum::<f64>() / n;
+        let middle = 0.5 * (n - 1.0);
+        let from_middle = |k: usize| as_f64(k) - middle;
+        let (mut along, mut across, mut whole) = (0.0, 0.0, 0.0);
+        for (k, value) in row.iter().enumerate() {
+            along += from_middle(k) * from_middle(k);
+            across += from_middle(k) * (value - mean);
+            whole += (value - mean) * (value - mean);
+        }
+        if !(along > 0.0 && whole > 0.0) {
+            return Self { share: 0.0, rise: 0.0, squares: whole };
+        }
+        let slope = across / along;
+        let explained = (slope * across).min(whole);
+        Self { share: explained / whole, rise: slope * (n - 1.0), squares: whole - explained }
+    }
+
+    /// The line through a row where it is more than chance: more than a tenth of
+    /// the row, and more than as few samples would show as what it leaves says as
+    /// much as.
+    pub fn seen_in(row: &[f64]) -> Option<Self> {
+        let trend = Self::of(row);
+        if trend.share < SMALL {
+            return None;
+        }
+        let n = as_f64(row.len().max(2));
+        let (mean, slope) = (row.iter().sum::<f64>() / n, trend.rise / (n - 1.0));
+        let about =
+            |(k, value): (usize, &f64)| value - mean - slope * (as_f64(k) - 0.5 * (n - 1.0));
+        let left: Vec<f64> = row.iter().enumerate().map(about).collect();
+        let ratio = trend.share / (1.0 - trend.share).max(f64::MIN_POSITIVE)
+            * Colour::of(&left).independent(left.len());
+        (ratio > SEEN).then_some(trend)
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "counts of samples")]
+fn as_f64(count: usize) -> f64 {
+    count as f64
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    fn noise(seed: u64, keep: f64) -> Vec<f64> {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut value = 0.0;
+        let mut next = || {
+            let drawn: f64 = StandardNormal.sample(&mut random);
+            value = keep * value + (1.0 - keep * keep).sqrt() * drawn;
+            value
+        };
+        (0..2000).map(|_| next()).collect()
+    }
+
+    #[test]
+    fn a_line_is_found_with_its_rise() {
+        let line: Vec<f64> = (0..101).map(|k| 3.0 - 0.2 * f64::from(k)).collect();
+        let found = Trend::of(&line);
+        assert!((found.share - 1.0).abs() < 1e-12 && (found.rise + 20.0).abs() < 1e-9);
+        assert!(found.squares < 1e-9);
+        assert_eq!(Trend::of(&[4.0; 9]), Trend { share: 0.0, rise: 0.0, squares: 0.0 });
+        assert_eq!(Trend::of(&[]).share, 0.0);
+    }
+
+    #[test]
+    fn drift_is_seen_below_noise_and_noise_is_none() {
+        for seed in 0..30 {
+            assert_eq!(Trend::seen_in(&noise(seed, 0.0)), None, "{seed}");
+            assert_eq!(Trend::seen_in(&noise(seed, 0.98)), None, "{seed}");
+            let drifts = noise(seed, 0.5);
+            let drifts: Vec<f64> =
+                (0..2000).zip(drifts).map(|(k, e)| e + 1e-3 * f64::from(k)).collect();
+            let seen = Trend::seen_in(&drifts).unwrap();
+            assert!((seen.rise - 2.0).abs() < 0.8, "{seen:?}");
+        }
+    }
+}

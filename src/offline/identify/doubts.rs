@@ -1,0 +1,123 @@
+//! What a reader should know of a model before it is used.
+
+use super::{Logs, Study};
+use crate::identify::fit::{Fit, Note, Trend};
+use crate::identify::number::short;
+
+/// A model that is further off other data than off its own by this factor is
+/// told. Errors are compared and not fits, which grow with the excitation.
+const OVERFIT: f64 = 1.25;
+/// A fit below this is told \[%\].
+const POOR_PERCENT: f64 = 50.0;
+/// Data that validate last at least so many of the slowest time constants.
+const TIME_CONSTANTS: f64 = 5.0;
+/// A record shorter than so many of the slowest time constants shows no end of it.
+const RECORD_TIME_CONSTANTS: f64 = 3.0;
+
+impl Study {
+    /// What the reader should know before the model is used.
+    pub(super) fn doubts(&self) -> Vec<String> {
+        let mut doubts: Vec<String> =
+            self.logs.estimation.notes.iter().map(|note| format!("data: {note}")).collect();
+        if let Some((data, from)) = &self.logs.validation {
+            doubts.extend(data.notes.iter().map(|note| format!("{from}: {note}")));
+        }
+        doubts.extend(self.fit.notes.iter().map(of_note));
+        let own = self.fit.quality.fit_percent;
+        if own < POOR_PERCENT {
+            doubts.push(format!(
+                "the model explains little of the data ({own:.1} % fit): look for what else moves \
+                 the output, or filter it with --hampel and --smooth"
+            ));
+        }
+        match self.validation {
+            None => doubts.push(
+                "nothing was validated with: a fit to its own data says little; give --validate or \
+                 --validate-share"
+                    .to_owned(),
+            ),
+            Some(other) if other.rmse > OVERFIT * self.fit.quality.rmse => doubts.push(format!(
+                "the model is {:.1} times as far off the data to validate with as off its own: take \
+                 fewer poles and zeros, log longer, or look whether the machine has changed",
+                other.rmse / self.fit.quality.rmse
+            )),
+            Some(_) => {}
+        }
+        doubts.extend(self.short_validation());
+        doubts.extend(self.short_record());
+        doubts.extend(of_drift(&self.fit, &self.logs));
+        let outside = self.residuals.share_outside();
+        if outside > 0.05 {
+            doubts.push(format!(
+                "what the model leaves hangs together ({:.0} % of the lags outside the 99 % band; the \
+                 {} samples say as much as {:.0} independent ones): the noise is coloured, or \
+                 something is missing in the model; the standard errors allow for it",
+                100.0 * outside,
+                self.fit.residuals.len(),
+                self.fit.independent_samples
+            ));
+        }
+        doubts
+    }
+
+    fn short_validation(&self) -> Option<String> {
+        let (data, _) = self.logs.validation.as_ref()?;
+        let needed_s = TIME_CONSTANTS * self.slowest_s() + self.fit.model.dead_time_s();
+        (data.duration_s() < needed_s).then(|| {
+            format!(
+                "the {:.1} s to validate with are short for a time constant of {:.2} s: {needed_s:.1} \
+                 s or more would tell",
+                data.duration_s(),
+                self.slowest_s()
+            )
+        })
+    }
+
+    /// A time constant that the record hardly shows may be a drift.
+    fn short_record(&self) -> Option<String> {
+        let (slowest_s, record_s) = (self.slowest_s(), self.logs.estimation.duration_s());
+        (record_s < RECORD_TIME_CONSTANTS * slowest_s).then(|| {
+            format!(
+                "the record of {record_s:.1} s is short for a time constant of {slowest_s:.2} s: the \
+                 model may follow a drift, such as a machine that warms up, and not the input. Log \
+                 longer once it is warm, or take fewer poles"
+            )
+        })
+    }
+}
+
+/// What is said of a straight line in time in what a model leaves.
+pub(super) fn of_drift(fit: &Fit, logs: &Logs) -> Option<String> {
+    let line = Trend::seen_in(&fit.residuals)?;
+    Some(format!(
+        "the output drifts {} by {} {} over {:.1} s, whatever the input does: a straight line in time \
+         explains {:.0} % of what the model leaves. Hold temperature and feed steady, use a part \
+         without the drift (--from-s, --to-s), or take the line out of the log",
+        if line.rise > 0.0 { "up" } else { "down" },
+        short_of(line.rise.abs()),
+        logs.output.unit,
+        logs.estimation.duration_s(),
+        100.0 * line.share
+    ))
+}
+
+/// To three digits.
+fn short_of(value: f64) -> String {
+    format!("{value:.2e}").parse().map_or_else(|_| value.to_string(), short)
+}
+
+fn of_note(note: &Note) -> String {
+    match note {
+        Note::NoDeadTime => "no dead time shows; it was left out".to_owned(),
+        Note::PolesAreReal => {
+            "the damping is above 1: both poles are real; --model sopdt-real gives \
+                               their time constants"
+                .to_owned()
+        }
+        Note::DeadTimeToAStep { dead_time_s } => format!(
+            "the dead time of {dead_time_s:.4} s is told to a whole step only: the form passes its \
+             input straight through"
+        ),
+        Note::Undetermined(loose) => loose.to_string(),
+    }
+}
