@@ -47,7 +47,8 @@ pub fn verdict(summary: &Summary, max_rejected_share: f64) -> Verdict {
         sentences.extend(more);
         if let Some(sentence) = far_off(control, summary) {
             level = level.max(Level::Caution);
-            sentences.push(sentence);
+            // Right behind the error that it speaks of.
+            sentences.insert(1, sentence);
         }
     }
     if let Some(extruder) = &summary.extruder {
@@ -72,6 +73,11 @@ fn width_sentence(summary: &Summary) -> String {
     let spread = summary
         .width_std_mm
         .map_or(String::new(), |std| format!(", with a standard deviation of {std:.3} mm"));
+    if is_excited(summary) {
+        return format!(
+            "A profile moved the extruder, and with it the bead: {mean:.3} mm wide on average{spread}."
+        );
+    }
     match (&summary.control, summary.target_width_mm) {
         (Some(control), Some(target)) => held_sentence(control, target),
         (_, Some(target)) => format!(
@@ -81,6 +87,11 @@ fn width_sentence(summary: &Summary) -> String {
         ),
         _ => format!("The bead is {mean:.3} mm wide on average{spread}."),
     }
+}
+
+/// Whether the extruder played a profile: the width then moves on purpose.
+fn is_excited(summary: &Summary) -> bool {
+    summary.extruder.as_ref().is_some_and(|extruder| extruder.profile.is_some())
 }
 
 fn more_or_less(difference: f64) -> String {
@@ -125,7 +136,7 @@ fn share_sentence(summary: &Summary, max_rejected_share: f64) -> String {
 fn far_off(control: &ControlSummary, summary: &Summary) -> Option<String> {
     let (error, target) = (control.width_error_rms_settled_mm?, summary.target_width_mm?);
     let share = control.limited_s / summary.duration_s.unwrap_or(f64::INFINITY);
-    if error > FAR_OFF * target {
+    if error > FAR_OFF * target && !is_excited(summary) {
         Some(format!("That is {:.0} % of the target.", 100.0 * error / target))
     } else if share > LONG_LIMITED {
         Some(format!("The robot stood at a limit for {:.0} % of the time.", 100.0 * share))
