@@ -2,11 +2,20 @@
 
 /// A value to six digits, without the tail that arithmetic leaves.
 pub fn short(value: f64) -> String {
+    rounded(value, 5)
+}
+
+/// The same to three digits, for what is known about.
+pub fn brief(value: f64) -> String {
+    rounded(value, 2)
+}
+
+fn rounded(value: f64, places: usize) -> String {
     let size = value.abs();
     if size == 0.0 || !value.is_finite() {
         return value.to_string();
     }
-    let rounded = format!("{value:.5e}");
+    let rounded = format!("{value:.places$e}");
     let Ok(rounded) = rounded.parse::<f64>() else { return rounded };
     if (1e-4..1e7).contains(&size) { rounded.to_string() } else { format!("{rounded:e}") }
 }
@@ -29,5 +38,6 @@ mod tests {
         ] {
             assert_eq!(short(value), told);
         }
+        assert_eq!(brief(138.464), "138");
     }
 }

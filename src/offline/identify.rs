@@ -68,8 +68,13 @@ pub enum Refusal {
     #[error(transparent)]
     Data(#[from] SamplesError),
     /// None of the forms.
-    #[error("no model can be trusted:{}", lines(.0))]
-    None(Vec<(String, String)>),
+    #[error("no model can be trusted:{}{}", lines(.forms), beside(.drift.as_ref()))]
+    None {
+        /// Each form, and why it is none.
+        forms: Vec<(String, String)>,
+        /// What is said of an output that drifts.
+        drift: Option<String>,
+    },
     /// It does not foretell other data.
     #[error(
         "the model ({form}, {estimation:.1} % on its own data) does not foretell the data to \
@@ -83,7 +88,7 @@ pub enum Refusal {
         estimation: f64,
         /// Fit to the others \[%\].
         validation: f64,
-        /// What is said of a drift in what the model leaves of its own data.
+        /// What is said of an output that drifts.
         drift: Option<String>,
     },
     /// The output moves before the input does.
@@ -108,6 +113,16 @@ fn lines(refused: &[(String, String)]) -> String {
     let lines: Vec<String> =
         lines.iter().map(|(forms, why)| format!("\n  {forms}: {why}")).collect();
     lines.concat()
+}
+
+fn none(comparison: &Comparison, logs: &Logs) -> Refusal {
+    let is_told = |row: &Row| matches!(row.fit, Err(FitError::Drift { .. }));
+    let drift = doubts::of_output(logs).filter(|_| !comparison.rows.iter().any(is_told));
+    Refusal::None { forms: comparison.rows.iter().map(refused).collect(), drift }
+}
+
+fn beside(sentence: Option<&String>) -> String {
+    sentence.map_or_else(String::new, |sentence| format!("\n  beside: {sentence}"))
 }
 
 fn further(sentence: Option<&String>) -> String {
@@ -145,14 +160,14 @@ pub fn study(logs: Logs, forms: &[Settings]) -> Result<Study, Refusal> {
         return Err(Refusal::Ahead(ahead));
     }
     let Some((Ok(fit), quality)) = chosen.map(|row| (row.fit.clone(), row.validation)) else {
-        return Err(Refusal::None(comparison.rows.iter().map(refused).collect()));
+        return Err(none(&comparison, &logs));
     };
     if let Some(quality) = quality.filter(|quality| quality.fit_percent <= 0.0) {
         return Err(Refusal::Foretells {
             form: form(fit.settings.structure),
             estimation: fit.quality.fit_percent,
             validation: quality.fit_percent,
-            drift: doubts::of_drift(&fit, &logs),
+            drift: doubts::of_output(&logs),
         });
     }
     let foretold = others.and_then(|(samples, before)| fit.predict(samples, before).ok());

@@ -2,7 +2,7 @@
 
 use super::loose::Loose;
 use super::samples::SamplesError;
-use crate::identify::number::short;
+use crate::identify::number::{brief, short};
 use crate::model::ModelError;
 
 /// Why there is no fit, with what was found.
@@ -74,7 +74,7 @@ pub enum FitError {
          and feed steady, use a part without the drift (--from-s, --to-s), or take the line out of \
          the log; an extruder that is so slow takes a longer log", if *.rise > 0.0 { "up" } else {
             "down"
-        }, short(.rise.abs())
+        }, brief(.rise.abs())
     )]
     Drift {
         /// Share of the output's variance that the line explains \[%\].

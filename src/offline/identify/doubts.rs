@@ -1,8 +1,9 @@
 //! What a reader should know of a model before it is used.
 
 use super::{Logs, Study};
+use crate::identify::experiment::Experiment;
 use crate::identify::fit::{Fit, Note, Trend};
-use crate::identify::number::short;
+use crate::identify::number::brief;
 
 /// A model that is further off other data than off its own by this factor is
 /// told. Errors are compared and not fits, which grow with the excitation.
@@ -13,6 +14,8 @@ const POOR_PERCENT: f64 = 50.0;
 const TIME_CONSTANTS: f64 = 5.0;
 /// A record shorter than so many of the slowest time constants shows no end of it.
 const RECORD_TIME_CONSTANTS: f64 = 3.0;
+/// A line that explains more than this share of an output dominates it.
+const DOMINATES: f64 = 0.5;
 
 impl Study {
     /// What the reader should know before the model is used.
@@ -87,28 +90,38 @@ impl Study {
 }
 
 /// What is said of a straight line in time in what a model leaves.
-pub(super) fn of_drift(fit: &Fit, logs: &Logs) -> Option<String> {
+fn of_drift(fit: &Fit, logs: &Logs) -> Option<String> {
     let line = Trend::seen_in(&fit.residuals)?;
-    Some(format!(
+    Some(drifting(logs, &line, "what the model leaves"))
+}
+
+/// What is said of an output that such a line dominates, and not the input.
+pub(super) fn of_output(logs: &Logs) -> Option<String> {
+    let Experiment { input, output, .. } = &logs.estimation;
+    let line = Trend::seen_in(output).filter(|line| line.share > DOMINATES)?;
+    (Trend::of(input).share < DOMINATES).then(|| drifting(logs, &line, "it"))
+}
+
+fn drifting(logs: &Logs, line: &Trend, whose: &str) -> String {
+    format!(
         "the output drifts {} by {} {} over {:.1} s, whatever the input does: a straight line in time \
-         explains {:.0} % of what the model leaves. Hold temperature and feed steady, use a part \
-         without the drift (--from-s, --to-s), or take the line out of the log",
+         explains {:.0} % of {whose}. Hold temperature and feed steady, use a part without the drift \
+         (--from-s, --to-s), or take the line out of the log",
         if line.rise > 0.0 { "up" } else { "down" },
-        short_of(line.rise.abs()),
+        brief(line.rise.abs()),
         logs.output.unit,
         logs.estimation.duration_s(),
         100.0 * line.share
-    ))
-}
-
-/// To three digits.
-fn short_of(value: f64) -> String {
-    format!("{value:.2e}").parse().map_or_else(|_| value.to_string(), short)
+    )
 }
 
 fn of_note(note: &Note) -> String {
     match note {
-        Note::NoDeadTime => "no dead time shows; it was left out".to_owned(),
+        Note::NoDeadTime => {
+            "no dead time shows; it was left out (a clock of the output that is behind the input's \
+ hides one)"
+                .to_owned()
+        }
         Note::PolesAreReal => {
             "the damping is above 1: both poles are real; --model sopdt-real gives \
                                their time constants"

@@ -136,6 +136,15 @@ fn a_drift_is_no_answer() {
 }
 
 #[test]
+fn a_drift_behind_another_refusal_is_told() {
+    let (first, rest) = with(|time_s, flow| flow + 5.0 * time_s).split(0.3).unwrap();
+    let data = logs(first, Some(rest));
+    let said = study(data, &[settings(Structure::FirstOrder { zero: false })]).unwrap_err();
+    let said = said.to_string();
+    assert!(said.contains("upper end") && said.contains("the output drifts up by 3"), "{said}");
+}
+
+#[test]
 fn a_drift_beside_the_answer_is_told() {
     let drifting = with(|time_s, flow| flow + time_s);
     let found =
@@ -158,6 +167,7 @@ fn an_output_on_a_clock_that_is_behind_is_refused() {
 #[test]
 fn forms_that_are_refused_alike_are_told_once() {
     let one = |form: &str, why: &str| (form.to_owned(), why.to_owned());
-    let refusal = Refusal::None(vec![one("fopdt", "a"), one("3,2", "b"), one("sopdt", "a")]);
+    let forms = vec![one("fopdt", "a"), one("3,2", "b"), one("sopdt", "a")];
+    let refusal = Refusal::None { forms, drift: None };
     assert_eq!(refusal.to_string(), "no model can be trusted:\n  fopdt, sopdt: a\n  3,2: b");
 }
