@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use truebead::identify::file;
+use truebead::sim::hash::{mix, normal_pair};
 use truebead::sim::logged;
 
 fn truebead(args: &[&str]) -> Command {
@@ -359,7 +360,7 @@ fn what_a_recording_cannot_be_asked_for() {
     // A recording is not written over.
     let mut again = truebead(&["simulate", "--record"]);
     again.arg(folder.path().join("cell.toml")).arg("--out").arg(folder.path().join("run"));
-    assert!(said(&mut again, 1).contains("is not overwritten"));
+    assert!(said(&mut again, 2).contains("recording.mcap is there already"));
 }
 
 /// A log of a bead that is measured 40 mm behind the nozzle while the speed
@@ -433,4 +434,39 @@ fn a_flow_that_was_measured_on_the_bead_is_the_flow_at_the_nozzle() {
     let list = said(truebead(&["identify"]).arg(&log), 0);
     assert!(list.contains("area_mm2 ") && list.contains("50.00 Hz"), "{list}");
     assert!(!list.contains("time_s"), "{list}");
+}
+
+#[test]
+fn the_noise_of_a_pressure_is_told_in_the_keys_of_a_cell() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("standing.csv");
+    // 7 kPa of noise on a pressure that gains 1 kPa from reading to reading.
+    let mut text = "time_s,nozzle_bar,screw_rpm\n".to_owned();
+    let mut pressure = 0.6;
+    for i in 0..6000_u32 {
+        let [step, noise] = normal_pair(mix(&[11, u64::from(i)]));
+        pressure += 0.001 * step;
+        let bar = 10.0 * 0.007_f64.mul_add(noise, pressure);
+        writeln!(text, "{:.3},{bar:.5},30", f64::from(i) * 0.02).unwrap();
+    }
+    fs::write(&file, &text).unwrap();
+    let of = |more: &[&str], code| {
+        let mut command = truebead(&["identify"]);
+        said(command.arg(&file).args(more), code)
+    };
+    let told = of(&["--noise", "nozzle_bar"], 0);
+    let value = |key: &str| {
+        let line = told.lines().find(|line| line.starts_with(key)).unwrap();
+        line.split_whitespace().nth(2).unwrap().parse::<f64>().unwrap()
+    };
+    assert!((value("sensor_noise_mpa") / 0.007 - 1.0).abs() < 0.05, "{told}");
+    assert!((value("wander_mpa2").sqrt() / 0.001 - 1.0).abs() < 0.25, "{told}");
+    for (column, code, words) in
+        [("screw_rpm", 2, "expected a pressure"), ("nozzle_mpa", 2, "nozzle_mpa")]
+    {
+        let told = of(&["--noise", column], code);
+        assert!(told.contains(words), "{told}");
+    }
+    let few = of(&["--noise", "nozzle_bar", "--from-s", "118"], 1);
+    assert!(few.contains("at least 200"), "{few}");
 }

@@ -5,6 +5,7 @@ mod data;
 mod example;
 mod keep;
 mod list;
+mod noise;
 mod options;
 mod source;
 
@@ -41,6 +42,7 @@ Examples:
   truebead identify example/log.csv --input screw_rpm --output flow_mm3_per_s \\
       --validate example/other.csv --material PLA --nozzle-mm 0.4 --temperature-c 210 \\
       --library models
+  truebead identify standing.csv --noise nozzle_mpa
 
   truebead simulate cells/extruder-excite.toml --record --out excite
   truebead identify excite/recording.mcap
@@ -125,6 +127,10 @@ pub struct IdentifyArgs {
         requires = "temperature_c"
     )]
     library: Option<PathBuf>,
+    /// Tell the noise of a pressure, of a log in which the command stood, as the keys
+    /// of [extruder.pressure], instead of a model
+    #[arg(long, value_name = "COLUMN", conflicts_with_all = ["input", "output", "library"])]
+    noise: Option<String>,
     /// Write logs of a simulated extruder to this folder, to try it with; a folder that
     /// holds them already is refused
     #[arg(long, value_name = "DIR", exclusive = true)]
@@ -144,6 +150,9 @@ pub struct Wanted(Option<DeadTime>);
 pub fn run(args: &IdentifyArgs) -> Result<()> {
     if let Some(folder) = &args.example {
         return example::write(folder);
+    }
+    if let (Some(data), Some(column)) = (&args.data, &args.noise) {
+        return noise::write(data, column, &args.columns, &args.bead);
     }
     let setting = args.setting()?;
     if let Some(data) = args.data.as_ref().filter(|_| args.asks_for_columns()) {

@@ -83,7 +83,7 @@ pub fn setup(
         Strategy::Profile { .. } => Law::Profile(played(needed()?, part)?),
         Strategy::Feedforward(keys) => {
             let behaviour = match &keys.model {
-                ModelSource::Screw(screw) => carried(screw)?,
+                ModelSource::Screw(screw) => carried(*screw)?,
                 ModelSource::File(_) | ModelSource::Library { .. } => {
                     identified(keys, part, cell, needed()?)?
                 }
@@ -103,7 +103,7 @@ fn wrong(cell: &str, what: &str) -> WrongArguments {
 
 /// A screw that carries the same volume with every turn, as a model from rpm to
 /// mm³/s.
-fn carried(screw: &DragFlow) -> anyhow::Result<(TransferFunction, OperatingPoint)> {
+fn carried(screw: DragFlow) -> anyhow::Result<(TransferFunction, OperatingPoint)> {
     let one = screw.flow(Rpm::constant(1.0))?;
     Ok((TransferFunction::gain(one.get())?, OperatingPoint::default()))
 }

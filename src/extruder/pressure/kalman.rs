@@ -25,10 +25,9 @@ impl Noise {
         Ok(Self { wander: wander_mpa2, reading: reading_mpa2 })
     }
 
-    /// From readings at a steady command. A random walk under white noise
-    /// changes from reading to reading with the variance q + 2r, and
-    /// neighbouring changes have the covariance −r. Needs
-    /// [`FEWEST_READINGS`], and fails on readings that show no noise.
+    /// From readings at a steady command: of all random walks under white noise
+    /// the one that makes them likeliest, by this filter's own innovations.
+    /// Needs [`FEWEST_READINGS`], and fails on readings that show no noise.
     pub fn identify(readings: &[MPa]) -> Result<Self, PressureError> {
         let found = readings.len();
         if found < FEWEST_READINGS {
@@ -37,16 +36,25 @@ impl Noise {
         let changes: Vec<f64> =
             readings.windows(2).map(|pair| pair[1].get() - pair[0].get()).collect();
         let variance = mean(changes.iter().map(|change| change * change));
-        let reading = -mean(changes.windows(2).map(|pair| pair[0] * pair[1]));
-        if !(variance > 0.0 && reading > 0.01 * variance) {
+        if !(variance > 0.0 && variance.is_finite()) {
             return Err(PressureError::NoNoise { variance });
         }
-        Self::new((variance - 2.0 * reading).max(0.0), reading)
+        let share = likeliest_wander(readings);
+        let reading = Likelihood::of(readings, share).reading;
+        if reading <= 0.01 * variance {
+            return Err(PressureError::NoNoise { variance });
+        }
+        Self::new(share * reading, reading)
     }
 
     /// Standard deviation of a reading.
     pub fn sigma(&self) -> MPa {
         MPa::new(self.reading.sqrt()).unwrap_or_default()
+    }
+
+    /// Variance that the pressure gains from one reading to the next \[MPa²\].
+    pub const fn wander_mpa2(&self) -> f64 {
+        self.wander
     }
 
     /// Variance of a reading \[MPa²\].
@@ -59,6 +67,54 @@ impl Noise {
 fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     let count = values.len().max(1) as f64;
     values.sum::<f64>() / count
+}
+
+/// How likely readings are where the pressure's own steps have a share of the
+/// variance of a reading, whose own variance is the likeliest to that share.
+#[derive(Debug, Clone, Copy)]
+struct Likelihood {
+    /// Variance of a reading \[MPa²\].
+    reading: f64,
+    /// Logarithm, but for a constant.
+    log: f64,
+}
+
+impl Likelihood {
+    fn of(readings: &[MPa], share: f64) -> Self {
+        let Some((first, rest)) = readings.split_first() else {
+            return Self { reading: 0.0, log: f64::NEG_INFINITY };
+        };
+        // In units of the readings' variance; the first reading is all that is
+        // known to begin with.
+        let (mut at, mut variance) = (first.get(), 1.0);
+        let (mut squares, mut logs, mut count) = (0.0, 0.0, 0.0);
+        for reading in rest {
+            let foretold = variance + share;
+            let innovation = foretold + 1.0;
+            let off = reading.get() - at;
+            squares += off * off / innovation;
+            logs += libm::log(innovation);
+            count += 1.0;
+            at += foretold / innovation * off;
+            variance = foretold / innovation;
+        }
+        let reading = squares / f64::max(count, 1.0);
+        Self { reading, log: -0.5 * (count * libm::log(reading) + logs) }
+    }
+}
+
+/// Variance of the pressure's own step from reading to reading over that of a
+/// reading, between 1e-10 and 1e4, to a hundredth.
+fn likeliest_wander(readings: &[MPa]) -> f64 {
+    let log_of = |exponent: f64| Likelihood::of(readings, libm::exp(exponent)).log;
+    let mut likeliest = -7.0;
+    for (step, reach) in [(1.0, 16), (0.1, 9), (0.01, 9)] {
+        let around = (-reach..=reach).map(|k| likeliest + step * f64::from(k));
+        let better = |best: (f64, f64), next: (f64, f64)| if next.0 > best.0 { next } else { best };
+        let start = (f64::NEG_INFINITY, likeliest);
+        likeliest = around.map(|exponent| (log_of(exponent), exponent)).fold(start, better).1;
+    }
+    libm::exp(likeliest)
 }
 
 /// The filter.
@@ -146,9 +202,8 @@ mod tests {
     #[test]
     fn the_noise_is_told_from_readings() {
         let found = Noise::identify(&readings(Q, R, 20_000)).unwrap();
-        // Four standard errors of a covariance of neighbours.
-        assert!((found.reading / R - 1.0).abs() < 0.08, "{found:?}");
-        assert!((found.wander / Q - 1.0).abs() < 0.2, "{found:?}");
+        assert!((found.reading / R - 1.0).abs() < 0.04, "{found:?}");
+        assert!((found.wander / Q - 1.0).abs() < 0.08, "{found:?}");
         assert!((found.sigma().get() - 0.007_06).abs() < 3e-4);
     }
 

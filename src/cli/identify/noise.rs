@@ -1,0 +1,82 @@
+//! How much a pressure's readings scatter and the pressure wanders, in the keys
+//! that a cell's pressure loop takes its thresholds from.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+
+use super::bead::Bead;
+use super::data::Rows;
+use super::options::Columns;
+use super::source::Source;
+use crate::cli::WrongArguments;
+use crate::extruder::pressure::kalman::Noise;
+use crate::identify::grid::usual_step;
+use crate::identify::quantity::Unit;
+use crate::units::MPa;
+
+/// A pressure's own steps from reading to reading over the scatter of the
+/// readings: beyond it, it was hardly at rest.
+const RESTLESS: f64 = 1.0;
+
+/// Tells the noise of a column of pressures.
+pub fn write(path: &Path, column: &str, columns: &Columns, bead: &Bead) -> Result<()> {
+    let name = path.display().to_string();
+    let (time_s, values) = match Source::read(path, bead)? {
+        Source::Table(table) => {
+            let (time, unit_s) = columns.time(table.names())?;
+            let rows = Rows { table: &table, name: &name, columns };
+            let mut time_s: Vec<f64> =
+                rows.column(&time)?.iter().map(|time| time * unit_s).collect();
+            let mut values = rows.column(column)?;
+            columns.cut(&mut time_s, &mut values.clone(), &mut values);
+            (time_s, values)
+        }
+        Source::Recording(found) => {
+            let series = found.columns.iter().find(|series| series.name == column);
+            let series = series.ok_or_else(|| {
+                let known: Vec<_> = found.columns.iter().map(|c| c.name.as_str()).collect();
+                WrongArguments::new(format!(
+                    "{name}: there is no column {column}; the columns are {}",
+                    known.join(", ")
+                ))
+            })?;
+            let kept = columns.cut_series(series);
+            (kept.time_s, kept.values)
+        }
+    };
+    let to_mpa = in_mpa(column, columns)?;
+    let pressures: Vec<MPa> =
+        values.iter().filter_map(|value| MPa::new(value * to_mpa).ok()).collect();
+    let noise = Noise::identify(&pressures).with_context(|| format!("{name}: {column}"))?;
+    tell(column, &noise, values.len(), usual_step(&time_s));
+    Ok(())
+}
+
+/// What a column is multiplied by to be in MPa.
+fn in_mpa(column: &str, columns: &Columns) -> Result<f64, WrongArguments> {
+    match columns.quantity(column)?.unit {
+        Unit::MPa => Ok(1.0),
+        Unit::KPa => Ok(1e-3),
+        Unit::Bar => Ok(0.1),
+        other => Err(WrongArguments::new(format!(
+            "--noise {column}: found {other}, expected a pressure in MPa, kPa or bar"
+        ))),
+    }
+}
+
+fn tell(column: &str, noise: &Noise, count: usize, step_s: Option<f64>) {
+    let every = step_s.map_or(String::new(), |step_s| format!(", one every {step_s:.3} s"));
+    say!("# {column}: {count} readings{every}");
+    say!("sensor_noise_mpa = {:.3e}   # standard deviation of a reading", noise.sigma().get());
+    say!(
+        "wander_mpa2 = {:.3e}        # variance that the pressure itself gains between two",
+        noise.wander_mpa2()
+    );
+    if noise.wander_mpa2() > RESTLESS * noise.reading_mpa2() {
+        tell!(
+            "warning: the pressure moves by more than its readings scatter; a noise is told from \
+             a command that stands: cut the rest off with --from-s and --to-s"
+        );
+    }
+}
