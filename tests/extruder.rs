@@ -396,6 +396,17 @@ fn a_profile_tells_how_far_it_was_played() {
 }
 
 #[test]
+fn the_width_of_a_bead_that_a_profile_moved_is_not_judged() {
+    let folder = tempfile::tempdir().unwrap();
+    let cell = cells().join("extruder-excite.toml");
+    let output = truebead(folder.path(), &["simulate", cell.to_str().unwrap(), "--out", "out"]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    assert!(page.contains("A profile moved the extruder") && !page.contains("% of the target"));
+    assert!(page.contains("verdict good"), "{}", &page[..3000]);
+}
+
+#[test]
 fn a_model_that_is_used_beyond_its_data_is_warned_of() {
     let cell = include_str!("../cells/extruder-feedforward.toml");
     let (_, said, _) = simulated_cell(cell, &[]);

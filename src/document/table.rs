@@ -1,0 +1,159 @@
+//! One table of a file: which keys it has, which it may have, and the tables
+//! below it.
+
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeSet;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::Document;
+use super::value::shown;
+
+/// One table of a document. Keys that nobody asked for are violations, which
+/// are reported when the table is dropped.
+pub struct Table<'a> {
+    document: &'a Document<'a>,
+    path: String,
+    items: Option<&'a DeTable<'a>>,
+    line: Option<usize>,
+    strict: bool,
+    asked: RefCell<BTreeSet<&'static str>>,
+    passed_over: Cell<bool>,
+}
+
+impl<'a> Table<'a> {
+    /// The outermost table of a document.
+    pub(super) fn root(document: &'a Document<'a>, items: &'a DeTable<'a>) -> Self {
+        Table {
+            document,
+            path: String::new(),
+            items: Some(items),
+            line: None,
+            strict: true,
+            asked: RefCell::default(),
+            passed_over: Cell::new(false),
+        }
+    }
+
+    /// Lets unknown keys of this table pass: which there may be hangs on one
+    /// that is wrong.
+    pub fn pass_over(&self) {
+        self.passed_over.set(true);
+    }
+
+    fn child(&self, key: &'static str, items: Option<&'a DeTable<'a>>, strict: bool) -> Table<'a> {
+        let value = self.get(key);
+        Table {
+            document: self.document,
+            path: self.key_path(key),
+            items,
+            line: value.map(|value| self.document.line_of(value.span().start)),
+            strict,
+            asked: RefCell::default(),
+            passed_over: Cell::new(false),
+        }
+    }
+
+    /// Reports the absence of a key, unless the table may be incomplete.
+    pub fn absent(&self, key: &'static str, expected: impl Into<String>) {
+        if self.strict {
+            self.report(key, "nothing", expected);
+        }
+    }
+
+    fn key_path(&self, key: &str) -> String {
+        if self.path.is_empty() { key.to_string() } else { format!("{}.{key}", self.path) }
+    }
+
+    pub(super) fn get(&self, key: &'static str) -> Option<&'a Spanned<DeValue<'a>>> {
+        self.asked.borrow_mut().insert(key);
+        self.items?.get(key)
+    }
+
+    /// Reports a violation at a key of this table.
+    pub fn report(&self, key: &'static str, found: impl Into<String>, expected: impl Into<String>) {
+        let line = self.get(key).map_or(self.line, |v| Some(self.document.line_of(v.span().start)));
+        self.document.report(line, &self.key_path(key), found, expected);
+    }
+
+    /// Whether the key stands in the file.
+    pub fn has(&self, key: &'static str) -> bool {
+        self.get(key).is_some()
+    }
+
+    /// A table within this one; `None` where there is none.
+    pub fn table(&self, key: &'static str) -> Option<Table<'a>> {
+        match self.get(key)?.get_ref() {
+            DeValue::Table(items) => Some(self.child(key, Some(items), true)),
+            other => {
+                self.report(key, shown(other), format!("a table [{}]", self.key_path(key)));
+                None
+            }
+        }
+    }
+
+    /// A table within this one, empty where there is none.
+    pub fn table_or_empty(&self, key: &'static str) -> Option<Table<'a>> {
+        if self.has(key) { self.table(key) } else { Some(self.child(key, None, true)) }
+    }
+
+    /// A table that only a run needs: there it must be and must be complete,
+    /// elsewhere it may be absent or lack keys.
+    pub fn run_table(&self, key: &'static str) -> Option<Table<'a>> {
+        if self.document.for_run {
+            return self.required_table(key);
+        }
+        let mut table = self.table(key)?;
+        table.strict = false;
+        Some(table)
+    }
+
+    /// A table that only a run reads, and that it may lack: complete in a run
+    /// where it stands at all.
+    pub fn optional_run_table(&self, key: &'static str) -> Option<Table<'a>> {
+        let mut table = self.table(key)?;
+        table.strict = self.document.for_run;
+        Some(table)
+    }
+
+    /// A table that must be there.
+    pub fn required_table(&self, key: &'static str) -> Option<Table<'a>> {
+        if !self.has(key) {
+            self.report(key, "nothing", format!("a table [{}]", self.key_path(key)));
+        }
+        self.table(key)
+    }
+}
+
+impl Drop for Table<'_> {
+    fn drop(&mut self) {
+        if self.passed_over.get() {
+            return;
+        }
+        let asked = self.asked.borrow();
+        for key in self.items.into_iter().flat_map(|items| items.keys()) {
+            let name = key.get_ref().as_ref();
+            if asked.contains(name) {
+                continue;
+            }
+            let line = self.document.line_of(key.span().start);
+            let near = asked.iter().find(|known| alike(known, name));
+            let expected = match near {
+                Some(known) => format!("\"{known}\"?"),
+                None if asked.is_empty() => "nothing here".to_string(),
+                None => format!("one of {}", asked.iter().copied().collect::<Vec<_>>().join(", ")),
+            };
+            self.document.report(Some(line), &self.key_path(name), "an unknown key", expected);
+        }
+    }
+}
+
+/// Whether an unknown key looks like a known one that was mistyped: same
+/// beginning, or the same letters but for one or two.
+fn alike(known: &str, found: &str) -> bool {
+    let shared = known.bytes().zip(found.bytes()).take_while(|(a, b)| a == b).count();
+    let tail = known.bytes().rev().zip(found.bytes().rev()).take_while(|(a, b)| a == b).count();
+    let longest = known.len().max(found.len());
+    shared + tail + 2 >= longest || (shared >= 6 && shared * 2 >= longest)
+}

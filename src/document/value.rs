@@ -1,0 +1,208 @@
+//! What the keys of a table hold: numbers within their ranges, texts, words.
+
+use std::ops::RangeInclusive;
+
+use toml::Spanned;
+use toml::de::DeValue;
+
+use super::Table;
+
+impl<'a> Table<'a> {
+    /// A number within a range; `None` where the key is absent or wrong.
+    pub fn optional_number(&self, key: &'static str, range: RangeInclusive<f64>) -> Option<f64> {
+        let value = self.get(key)?.get_ref();
+        let number = as_number(value);
+        match number {
+            Some(number) if range.contains(&number) => Some(number),
+            _ => {
+                self.report(key, shown(value), expected_number(&range));
+                None
+            }
+        }
+    }
+
+    /// A number that must be there.
+    pub fn number(&self, key: &'static str, range: RangeInclusive<f64>) -> Option<f64> {
+        if !self.has(key) {
+            self.absent(key, expected_number(&range));
+        }
+        self.optional_number(key, range)
+    }
+
+    /// A number with a value that stands for its absence.
+    pub fn number_or(
+        &self,
+        key: &'static str,
+        range: RangeInclusive<f64>,
+        default: f64,
+    ) -> Option<f64> {
+        if self.has(key) { self.optional_number(key, range) } else { Some(default) }
+    }
+
+    /// A whole number within a range; `None` where the key is absent or wrong.
+    pub fn optional_integer(&self, key: &'static str, range: RangeInclusive<u64>) -> Option<u64> {
+        let value = self.get(key)?.get_ref();
+        match as_integer(value) {
+            Some(number) if range.contains(&number) => Some(number),
+            _ => {
+                let expected = format!("a whole number from {} to {}", range.start(), range.end());
+                self.report(key, shown(value), expected);
+                None
+            }
+        }
+    }
+
+    /// A whole number with a value that stands for its absence.
+    pub fn integer_or(
+        &self,
+        key: &'static str,
+        range: RangeInclusive<u64>,
+        default: u64,
+    ) -> Option<u64> {
+        if self.has(key) { self.optional_integer(key, range) } else { Some(default) }
+    }
+
+    /// A row of `N` numbers, each within the range; it must be there.
+    pub fn numbers<const N: usize>(
+        &self,
+        key: &'static str,
+        range: RangeInclusive<f64>,
+    ) -> Option<[f64; N]> {
+        self.row(key, &[N], range)?.try_into().ok()
+    }
+
+    /// A row of numbers that must be there, as long as one of these counts.
+    pub fn row(
+        &self,
+        key: &'static str,
+        counts: &[usize],
+        range: RangeInclusive<f64>,
+    ) -> Option<Vec<f64>> {
+        let lengths = match counts {
+            [first, _, .., last] if counts.windows(2).all(|pair| pair[0] + 1 == pair[1]) => {
+                format!("{first} to {last}")
+            }
+            _ => counts.iter().map(usize::to_string).collect::<Vec<_>>().join(" or "),
+        };
+        let expected = format!("{lengths} numbers in brackets, each {}", expected_number(&range));
+        let Some(value) = self.get(key) else {
+            self.absent(key, expected);
+            return None;
+        };
+        let numbers: Option<Vec<f64>> = value.get_ref().as_array().and_then(|array| {
+            array.iter().map(|v| as_number(v.get_ref()).filter(|n| range.contains(n))).collect()
+        });
+        let row = numbers.filter(|numbers| counts.contains(&numbers.len()));
+        if row.is_none() {
+            self.report(key, shown(value.get_ref()), expected);
+        }
+        row
+    }
+
+    /// The same where the key may be absent.
+    pub fn optional_numbers<const N: usize>(
+        &self,
+        key: &'static str,
+        range: RangeInclusive<f64>,
+    ) -> Option<[f64; N]> {
+        if self.has(key) { self.numbers(key, range) } else { None }
+    }
+
+    /// A text that is not empty; `None` where the key is absent or wrong.
+    pub fn optional_text(&self, key: &'static str) -> Option<&'a str> {
+        let value = self.get(key)?.get_ref();
+        match value.as_str() {
+            Some(text) if !text.is_empty() => Some(text),
+            _ => {
+                self.report(key, shown(value), "a text in quotes");
+                None
+            }
+        }
+    }
+
+    /// A text that must be there.
+    pub fn text(&self, key: &'static str) -> Option<&'a str> {
+        if !self.has(key) {
+            self.absent(key, "a text in quotes");
+        }
+        self.optional_text(key)
+    }
+
+    /// A row of texts that must be there, none of them empty.
+    pub fn texts(&self, key: &'static str) -> Option<Vec<String>> {
+        let expected = "texts in brackets, each in quotes";
+        let Some(value) = self.get(key) else {
+            self.absent(key, expected);
+            return None;
+        };
+        let texts = value.get_ref().as_array().and_then(|array| {
+            let text = |item: &Spanned<DeValue<'a>>| item.get_ref().as_str().map(str::to_owned);
+            array.iter().map(|item| text(item).filter(|text| !text.is_empty())).collect()
+        });
+        if texts.is_none() {
+            self.report(key, shown(value.get_ref()), expected);
+        }
+        texts
+    }
+
+    /// One of several words, or the first where the key is absent.
+    pub fn choice<T: Copy>(&self, key: &'static str, words: &[(&str, T)]) -> Option<T> {
+        let Some(value) = self.get(key) else { return words.first().map(|word| word.1) };
+        let found =
+            words.iter().find(|word| value.get_ref().as_str() == Some(word.0)).map(|word| word.1);
+        if found.is_none() {
+            let names: Vec<String> = words.iter().map(|word| format!("\"{}\"", word.0)).collect();
+            self.report(key, shown(value.get_ref()), names.join(" or "));
+        }
+        found
+    }
+
+    /// One of several words; the key must be there.
+    pub fn required_choice<T: Copy>(&self, key: &'static str, words: &[(&str, T)]) -> Option<T> {
+        if self.has(key) {
+            return self.choice(key, words);
+        }
+        let names: Vec<String> = words.iter().map(|word| format!("\"{}\"", word.0)).collect();
+        self.absent(key, names.join(" or "));
+        None
+    }
+}
+
+fn expected_number(range: &RangeInclusive<f64>) -> String {
+    format!("a number from {} to {}", range.start(), range.end())
+}
+
+fn as_number(value: &DeValue<'_>) -> Option<f64> {
+    let number = match value {
+        DeValue::Float(float) => float.as_str().parse().ok()?,
+        #[expect(clippy::cast_precision_loss, reason = "no key takes a number beyond 2^53")]
+        DeValue::Integer(_) => as_signed(value)? as f64,
+        _ => return None,
+    };
+    number.is_finite().then_some(number)
+}
+
+fn as_signed(value: &DeValue<'_>) -> Option<i64> {
+    let integer = value.as_integer()?;
+    i64::from_str_radix(integer.as_str(), integer.radix()).ok()
+}
+
+fn as_integer(value: &DeValue<'_>) -> Option<u64> {
+    as_signed(value).and_then(|number| u64::try_from(number).ok())
+}
+
+/// A value as it stands in the file, short enough for a message.
+pub(super) fn shown(value: &DeValue<'_>) -> String {
+    match value {
+        DeValue::String(text) => format!("\"{text}\""),
+        DeValue::Integer(integer) => integer.to_string(),
+        DeValue::Float(float) => float.to_string(),
+        DeValue::Boolean(truth) => truth.to_string(),
+        DeValue::Datetime(datetime) => datetime.to_string(),
+        DeValue::Array(array) => {
+            let items: Vec<String> = array.iter().map(|item| shown(item.get_ref())).collect();
+            format!("[{}]", items.join(", "))
+        }
+        DeValue::Table(_) => "a table".to_string(),
+    }
+}
