@@ -106,6 +106,8 @@ pub struct LiveReport {
     pub summary: Summary,
     /// Why it ended.
     pub ending: Ending,
+    /// Whether the pump said until the end that it runs.
+    pub pump_runs: bool,
     /// The recording, whole or cut short.
     pub recording: Result<RecordReport, Box<Incomplete>>,
 }
@@ -188,6 +190,7 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         alarm: &alarm,
         stop: &live.stop,
     });
+    let pump_runs = control.extruder.as_ref().is_some_and(|side| !side.rests());
     drop(ending_tell);
     let seen = eye.seen.clone();
     let superseded = eye.stop();
@@ -201,11 +204,19 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
     let recording = recorder.finish();
     scribe.note(Note::FramesSuperseded(superseded));
     scribe.note(Note::FramesDroppedByRecorder(dropped));
+    if let Ending::RobotLimits(why) | Ending::ExtruderUnfit(why) = &ending {
+        scribe.note(Note::Remark(format!("The run was refused: {why}.")));
+    }
+    if pump_runs {
+        scribe.note(Note::Remark(
+            "The pump was told to stop and did not say that it stops.".to_owned(),
+        ));
+    }
     if let Err(incomplete) = &recording {
         scribe.note(Note::RecordsLost(1));
         scribe.note(Note::Remark(format!("the recording misses the end of the run: {incomplete}")));
     }
-    Ok(LiveReport { summary: scribe.finish()?, ending, recording })
+    Ok(LiveReport { summary: scribe.finish()?, ending, pump_runs, recording })
 }
 
 /// The link to the extruder, where it is commanded, and what it reports.

@@ -173,7 +173,7 @@ fn readings_are_filtered_before_the_strategy_goes_by_them() {
     assert!(off(&summary).abs() < 0.03, "{summary}");
     for (wrong, told) in [
         ("", "extruder.readings.spike_half_width"),
-        ("smooth_window = 8", "expected an odd number"),
+        ("smooth_window = 8", "expected an odd number from 3 to 101"),
         ("spike_half_width = 0", "extruder.readings.spike_half_width"),
         ("smooth_windw = 9\nspike_half_width = 2", "smooth_windw"),
     ] {

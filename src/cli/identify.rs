@@ -129,7 +129,7 @@ pub struct IdentifyArgs {
     library: Option<PathBuf>,
     /// Tell the noise of a pressure, of a log in which the command stood, as the keys
     /// of [extruder.pressure], instead of a model
-    #[arg(long, value_name = "COLUMN", conflicts_with_all = ["input", "output", "library"])]
+    #[arg(long, value_name = "COLUMN", conflicts_with_all = ["input", "output", "library", "out", "validate", "hampel", "smooth", "model"])]
     noise: Option<String>,
     /// Write logs of a simulated extruder to this folder, to try it with; a folder that
     /// holds them already is refused
@@ -184,10 +184,12 @@ fn write(found: &Study, setting: Setting, folder: &Path) -> Result<String> {
         text(found),
     ];
     let model = to_toml(&found.model(setting), &notes);
-    write_whole(folder, keep::MODEL, model.as_bytes())?;
     let json = serde_json::to_vec_pretty(&to_json(found)).context("identify.json")?;
     write_whole(folder, "identify.json", &json)?;
     write_whole(folder, "report.html", page(found).as_bytes())?;
+    // Last, for a model that is there is never replaced: what failed can be tried
+    // again.
+    write_whole(folder, keep::MODEL, model.as_bytes())?;
     Ok(model)
 }
 

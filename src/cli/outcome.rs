@@ -127,11 +127,18 @@ fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
             tell!("error: the controller gave up {times}; the report says why");
             return ExitCode::FAILURE;
         }
+        _ if report.pump_runs => {
+            tell!(
+                "error: the pump was told to stop and did not say that it stops; look at the extruder"
+            );
+            return ExitCode::FAILURE;
+        }
         Ending::Asked | Ending::TimeOver | Ending::LastFrame => {}
     }
     let control = report.summary.control.as_ref();
-    if control.is_some_and(|control| control.states_s.keys().all(|state| *state == "idle"))
-        && report.ending == Ending::TimeOver
+    let at_work = |state: &&str| matches!(*state, "priming" | "tracking");
+    if control.is_some_and(|control| !control.states_s.keys().any(at_work))
+        && report.ending != Ending::Asked
     {
         tell!(
             "warning: the robot never printed, so that nothing was controlled; start its program"

@@ -138,7 +138,8 @@ impl Drop for Table<'_> {
                 continue;
             }
             let line = self.document.line_of(key.span().start);
-            let near = asked.iter().find(|known| alike(known, name));
+            let likely = asked.iter().filter(|known| alike(known, name));
+            let near = likely.max_by_key(|known| in_common(known, name));
             let expected = match near {
                 Some(known) => format!("\"{known}\"?"),
                 None if asked.is_empty() => "nothing here".to_string(),
@@ -147,6 +148,13 @@ impl Drop for Table<'_> {
             self.document.report(Some(line), &self.key_path(name), "an unknown key", expected);
         }
     }
+}
+
+/// Letters that two keys share at their beginnings and their ends.
+fn in_common(known: &str, found: &str) -> usize {
+    let shared = known.bytes().zip(found.bytes()).take_while(|(a, b)| a == b).count();
+    let tail = known.bytes().rev().zip(found.bytes().rev()).take_while(|(a, b)| a == b).count();
+    shared + tail
 }
 
 /// Whether an unknown key looks like a known one that was mistyped: same

@@ -66,8 +66,9 @@ pub enum PressureError {
     },
     /// Readings that never change, or that tell no noise.
     #[error(
-        "the readings tell no noise (their changes have a variance of {variance} MPa²): \
-         a sensor that is stuck, or readings that were smoothed before"
+        "the readings tell no noise (their changes have a variance of {variance:.3e} MPa²): \
+         a sensor that is stuck, readings that were smoothed before, or a pressure that moves far \
+         more than they scatter"
     )]
     NoNoise {
         /// Variance of the change from one reading to the next \[MPa²\].

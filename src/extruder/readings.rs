@@ -40,15 +40,14 @@ impl Readings {
 
     /// The report as the law is to see it.
     pub fn pass(&mut self, report: &ExtruderReport) -> ExtruderReport {
-        let pressure =
-            report.pressure_mpa.and_then(|mpa| MPa::new(self.pressure.pass(mpa.get())).ok());
-        let flow =
-            report.flow_mm3_per_s.and_then(|flow| Mm3PerS::new(self.flow.pass(flow.get())).ok());
-        let filled = report.filled_mm.and_then(|mm| Mm::new(self.filled.pass(mm.get())).ok());
+        let filters = self.filters;
+        let pressure = self.pressure.pass(report.pressure_mpa.map(f64::from), filters);
+        let flow = self.flow.pass(report.flow_mm3_per_s.map(f64::from), filters);
+        let filled = self.filled.pass(report.filled_mm.map(f64::from), filters);
         ExtruderReport {
-            pressure_mpa: pressure,
-            flow_mm3_per_s: flow,
-            filled_mm: filled,
+            pressure_mpa: pressure.and_then(|mpa| MPa::new(mpa).ok()),
+            flow_mm3_per_s: flow.and_then(|flow| Mm3PerS::new(flow).ok()),
+            filled_mm: filled.and_then(|mm| Mm::new(mm).ok()),
             ..*report
         }
     }
@@ -59,6 +58,8 @@ impl Readings {
 struct Passage {
     spikes: Option<LiveHampel>,
     smoothing: Option<LiveSavGol>,
+    /// Whether a reading has passed.
+    begun: bool,
 }
 
 impl Passage {
@@ -66,13 +67,23 @@ impl Passage {
         Self {
             spikes: filters.spikes.map(LiveHampel::new),
             smoothing: filters.smoothing.map(|filter| LiveSavGol::new(&filter)),
+            begun: false,
         }
     }
 
-    fn pass(&mut self, reading: f64) -> f64 {
+    fn pass(&mut self, reading: Option<f64>, filters: ReadingFilters) -> Option<f64> {
+        let Some(reading) = reading else {
+            // What comes after a reading that was missing is no neighbour of what
+            // came before it.
+            if self.begun {
+                *self = Self::new(filters);
+            }
+            return None;
+        };
+        self.begun = true;
         let lone = self.spikes.as_mut().map_or(reading, |filter| filter.step(reading));
         // Until the window is full there is no polynomial.
-        self.smoothing.as_mut().and_then(|filter| filter.step(lone)).unwrap_or(lone)
+        Some(self.smoothing.as_mut().and_then(|filter| filter.step(lone)).unwrap_or(lone))
     }
 }
 
@@ -110,6 +121,7 @@ mod tests {
     fn a_lone_spike_does_not_pass_and_a_step_passes_half_a_window_late() {
         let spikes = Hampel::new(2, 4.0).ok();
         let mut readings = Readings::new(ReadingFilters { spikes, smoothing: None });
+        let nothing = ExtruderReport { pressure_mpa: None, ..report(0.0) };
         let noisy = |i: u64, mpa: f64| 0.007_f64.mul_add(normal_pair(mix(&[3, i]))[0], mpa);
         for i in 0..200 {
             let mpa = if i % 23 == 11 { 3.0 } else { noisy(i, 0.6) };
@@ -117,6 +129,9 @@ mod tests {
         }
         let after: Vec<f64> = (200..204).map(|i| passed(&mut readings, noisy(i, 0.9))).collect();
         assert!(after[1] < 0.65 && after[2] > 0.85, "{after:?}");
+        // After a report without the reading there is nothing to compare with.
+        assert_eq!(readings.pass(&nothing), nothing);
+        assert!((passed(&mut readings, 0.3) - 0.3).abs() < 1e-12);
     }
 
     #[test]

@@ -28,11 +28,11 @@ pub enum ExtruderHold {
 pub enum ExtruderFault {
     /// Held for longer than the cell allows, for this reason.
     HeldTooLong(ExtruderHold),
-    /// A bead began, and no extruder reports.
+    /// A bead began, or the pump begins anew on one, and no extruder reports.
     NoAnswer,
     /// The pump was told to run and did not.
     DidNotStart,
-    /// The pump was told to stop and runs on. Left when it rests.
+    /// The pump was told to stop and runs on. Left when it says that it stops.
     RunsOn,
     /// The pump stopped by itself, or reports a fault.
     Pump,

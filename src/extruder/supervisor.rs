@@ -8,7 +8,7 @@
 //! - holding: the last command is kept, for a reason; left when the reason
 //!   goes, and a fault when it stays too long.
 //! - fault: the pump is stopped; left when the robot is idle again, and where
-//!   the pump runs on all the same, not before it rests.
+//!   the pump runs on all the same, not before it says that it stops.
 
 mod watch;
 
@@ -73,6 +73,23 @@ enum Phase {
     Fault(ExtruderFault),
 }
 
+/// How a pump answers to being told to rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Obedience {
+    /// It rests, or was not told to.
+    Obeys,
+    /// It says that it runs all the same.
+    RunsOn { since: Stamp },
+    /// It has said so for longer than the cell is patient.
+    Lost { since: Stamp },
+}
+
+impl Obedience {
+    const fn is_lost(self) -> bool {
+        matches!(self, Self::Lost { .. })
+    }
+}
+
 /// The extruder side of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Supervisor {
@@ -92,9 +109,9 @@ pub struct Supervisor {
     begun: Stamp,
     /// When the last report came, on whatever connection.
     heard: Option<Stamp>,
-    /// Since when reports have said that the pump runs although it was told to
-    /// rest.
-    runs_on: Option<Stamp>,
+    /// Whether the pump rests when it is told to. Beside the phase, so that what
+    /// stopped the pump first is not forgotten.
+    obedience: Obedience,
     /// Whether the last report can be true.
     usable: bool,
     /// Whether the valve stays open to let too high a pressure out.
@@ -121,7 +138,7 @@ impl Supervisor {
             controlled: None,
             begun: Stamp::START,
             heard: None,
-            runs_on: None,
+            obedience: Obedience::Obeys,
             usable: true,
             relieving: false,
             told: None,
@@ -132,6 +149,7 @@ impl Supervisor {
     /// The state in words for outside.
     pub const fn state(&self) -> ExtruderState {
         match self.phase {
+            _ if self.obedience.is_lost() => ExtruderState::Fault(ExtruderFault::RunsOn),
             Phase::Off => ExtruderState::Off,
             Phase::Starting { .. } => ExtruderState::Starting,
             Phase::Running => ExtruderState::Running,
@@ -168,7 +186,7 @@ impl Supervisor {
         self.link_up = false;
         self.report = None;
         self.readings.forget();
-        self.runs_on = None;
+        self.obedience = Obedience::Obeys;
         self.follow.reset();
         self.hold(now, ExtruderHold::LinkDown);
     }
@@ -178,9 +196,9 @@ impl Supervisor {
     pub fn tick(&mut self, now: Stamp, laying: Laying) -> Option<ExtruderCommand> {
         let dt = self.ticked.replace(now).map_or(Span::ZERO, |last| now - last);
         match laying {
+            Laying::Bead(_) if self.obedience.is_lost() => {}
             Laying::Bead(flow) => self.lay(now, dt, flow),
             Laying::Stopped if matches!(self.phase, Phase::Fault(_)) => {}
-            Laying::Idle if self.phase == Phase::Fault(ExtruderFault::RunsOn) => {}
             Laying::Stopped | Laying::Idle => self.rest(),
         }
         let command = self.command();
@@ -196,7 +214,12 @@ impl Supervisor {
     /// The run is being ended: the pump stops now.
     pub fn stop(&mut self) -> Option<ExtruderCommand> {
         self.rest();
-        self.link_up.then(|| self.command())
+        let command = self.command();
+        if !self.link_up {
+            return None;
+        }
+        self.told = Some(command);
+        self.told
     }
 
     fn command(&self) -> ExtruderCommand {

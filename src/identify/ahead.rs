@@ -74,10 +74,10 @@ pub fn ahead(samples: &Samples, settings: &Settings, found: Option<&Fit>) -> Opt
     if !is_ahead || slow || fit.quality.fit_percent < LEAST_PERCENT {
         return None;
     }
-    let answering = answering(&cut(samples, 0, fit.residuals.len())?, settings);
-    let ratio = share_left(fit.quality.fit_percent) / share_left(answering);
+    let usual = answering(&cut(samples, 0, fit.residuals.len())?, settings);
+    let answering_percent = found.map_or(usual, |found| usual.max(found.quality.fit_percent));
+    let ratio = share_left(fit.quality.fit_percent) / share_left(answering_percent);
     let is_better = ratio < BETTER && -fit.independent_samples * libm::log(ratio) > SURE;
-    let answering_percent = answering;
     is_better.then_some(Ahead {
         ahead_s,
         sigma_s,

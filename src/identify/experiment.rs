@@ -161,16 +161,22 @@ impl Experiment {
             return Err(ExperimentError::TooFew { got: kept });
         }
         let (input, output) = (self.input.split_off(kept), self.output.split_off(kept));
-        for (side, values) in [
-            (Side::Input, &self.input),
-            (Side::Output, &self.output),
-            (Side::Input, &input),
-            (Side::Output, &output),
-        ] {
-            check_moves(side, values)?;
-        }
         #[expect(clippy::cast_precision_loss, reason = "counts of samples")]
-        let start_s = self.start_s + kept as f64 * self.step_s;
+        let [start_s, end_s] =
+            [kept, kept + left].map(|count| self.start_s + count as f64 * self.step_s);
+        for (side, values, validates) in [
+            (Side::Input, &self.input, false),
+            (Side::Output, &self.output, false),
+            (Side::Input, &input, true),
+            (Side::Output, &output, true),
+        ] {
+            check_moves(side, values).map_err(|error| {
+                let ExperimentError::Constant { side, value } = error else { return error };
+                let (from_s, to_s) =
+                    if validates { (start_s, end_s) } else { (self.start_s, start_s) };
+                ExperimentError::ConstantPart { side, value, from_s, to_s, validates }
+            })?;
+        }
         let rest = Self { start_s, input, output, notes: Vec::new(), ..self };
         Ok((self, rest))
     }

@@ -27,6 +27,7 @@
 
 mod clipped;
 mod compare;
+mod detrended;
 mod drift;
 mod error;
 mod levenberg;
@@ -43,6 +44,7 @@ mod trend;
 
 pub use clipped::{Clipped, Column, End};
 pub use compare::{Comparison, Row, compare};
+pub use detrended::SteadyGain;
 pub use error::FitError;
 pub use loose::Loose;
 pub use quality::Quality;

@@ -37,7 +37,7 @@ impl Job {
     pub fn connected(&mut self, mode: RobotMode) {
         self.acknowledges = matches!(mode, RobotMode::Stop | RobotMode::Fault);
         self.waiting_since = None;
-        if self.begun >= self.layers && mode == RobotMode::Idle {
+        if self.begun >= self.layers && (self.acknowledges || mode == RobotMode::Idle) {
             self.begun = 0;
         }
     }
@@ -112,6 +112,21 @@ mod tests {
         run(&mut job, &mut cell, 0.15, 5.0);
         assert_eq!((job.begun(), cell.mode()), (2, RobotMode::Idle));
         assert_eq!(cell.state(secs(5.0)).z_mm, Mm::constant(6.0));
+    }
+
+    #[test]
+    fn a_connection_after_a_stop_begins_the_finished_job_anew() {
+        let mut job = Job::new(1, Mm::ZERO, Mm::ZERO, Span::from_millis(100));
+        let mut cell = RobotCell::new(RobotParams::default(), Stamp::START).unwrap();
+        for connection in 0..3 {
+            let from_s = 5.0 * f64::from(connection);
+            cell.connect(secs(from_s));
+            job.connected(cell.mode());
+            cell.take(secs(from_s), PcLine::Hello);
+            run(&mut job, &mut cell, from_s, from_s + 1.0);
+            assert_eq!(cell.mode(), RobotMode::Print, "{connection}");
+            cell.take(secs(from_s + 1.0), PcLine::Stop { seq: 1 });
+        }
     }
 
     #[test]

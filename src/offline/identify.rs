@@ -12,7 +12,7 @@ use crate::identify::experiment::Experiment;
 use crate::identify::file::{self, ModelFile, Setting, Uncertainty};
 use crate::identify::fit::{
     Before, Comparison, Fit, FitError, Note, Quality, Row, Samples, SamplesError, Settings,
-    Structure, compare,
+    SteadyGain, Structure, compare,
 };
 use crate::identify::quantity::Quantity;
 use crate::identify::residual::Autocorrelation;
@@ -21,6 +21,14 @@ use crate::model::Between;
 pub use self::json::to_json;
 pub use self::page::page;
 pub use self::table::text;
+
+/// A gain that differs by so many standard errors and by this share of itself
+/// once a line in time is taken off is that of a drift…
+const CERTAIN_SIGMAS: f64 = 5.0;
+const CERTAIN_SHARE: f64 = 0.2;
+/// …and one that differs by so much may be.
+const LIKELY_SIGMAS: f64 = 4.0;
+const LIKELY_SHARE: f64 = 0.03;
 
 /// Lags of the residuals that are looked at, at most.
 const LAGS: usize = 300;
@@ -90,6 +98,23 @@ pub enum Refusal {
         validation: f64,
         /// What is said of an output that drifts.
         drift: Option<String>,
+    },
+    /// It follows a drift of the output.
+    #[error(
+        "the output drifts: the gain of the model ({form}) is {gain:.4}, but {steady:.4} ± {sigma:.4} \
+         once a straight line in time is taken off input and output; what moves the output besides \
+         the input is in the model. Hold temperature and feed steady, use a part without the drift \
+         (--from-s, --to-s), or take the line out of the log"
+    )]
+    Drifts {
+        /// Its form.
+        form: String,
+        /// Its gain.
+        gain: f64,
+        /// The gain without the line.
+        steady: f64,
+        /// Standard error of that.
+        sigma: f64,
     },
     /// The output moves before the input does.
     #[error(
@@ -170,6 +195,15 @@ pub fn study(logs: Logs, forms: &[Settings]) -> Result<Study, Refusal> {
             drift: doubts::of_output(&logs),
         });
     }
+    let steady = SteadyGain::of(&estimation, &fit.settings);
+    if let Some(found) = steady.filter(|steady| is_another(steady, &fit)) {
+        return Err(Refusal::Drifts {
+            form: form(fit.settings.structure),
+            gain: fit.model.dc_gain(),
+            steady: found.gain,
+            sigma: found.sigma,
+        });
+    }
     let foretold = others.and_then(|(samples, before)| fit.predict(samples, before).ok());
     let residuals = Autocorrelation::of(&fit.residuals, LAGS.min(fit.residuals.len() / 4));
     let mut study = Study {
@@ -182,7 +216,14 @@ pub fn study(logs: Logs, forms: &[Settings]) -> Result<Study, Refusal> {
         warnings: Vec::new(),
     };
     study.warnings = study.doubts();
+    study.warnings.extend(steady.and_then(|steady| study.other_gain(&steady)));
     Ok(study)
+}
+
+/// Whether a model's gain is that of a drift.
+fn is_another(steady: &SteadyGain, fit: &Fit) -> bool {
+    let (sigmas, share) = steady.apart(fit.model.dc_gain());
+    sigmas > CERTAIN_SIGMAS && share > CERTAIN_SHARE
 }
 
 fn samples(data: &Experiment) -> Result<Samples, SamplesError> {
@@ -210,6 +251,19 @@ impl Study {
         let poles = self.fit.model.poles();
         let slowest = poles.iter().map(|pole| -pole.re).fold(f64::INFINITY, f64::min);
         1.0 / slowest
+    }
+
+    /// What is said of a gain that a drift may have moved.
+    fn other_gain(&self, steady: &SteadyGain) -> Option<String> {
+        let gain = self.fit.model.dc_gain();
+        let (sigmas, share) = steady.apart(gain);
+        (sigmas > LIKELY_SIGMAS && share > LIKELY_SHARE).then(|| {
+            format!(
+                "the gain is {gain:.4}, but {:.4} ± {:.4} once a straight line in time is taken off \
+                 input and output: the output drifts, and the model follows it in part",
+                steady.gain, steady.sigma
+            )
+        })
     }
 
     /// The model as a file keeps it.

@@ -50,6 +50,16 @@ pub fn beyond(part: &ExtruderPart, side: &ExtruderSide) -> anyhow::Result<Option
     match &side.setup.law {
         Law::Profile(played) => Ok(too_fast(part, side, played)),
         _ => match steady(part, side)? {
+            Some(Steady { pressure: Some(pressure), .. })
+                if part.extruder.max_pressure.is_some_and(|most| pressure > most) =>
+            {
+                Ok(Some(format!(
+                    "[extruder]: {:.1} mm³/s take {:.3} MPa at the nozzle, above max_pressure_mpa; \
+                     the pump will be stopped",
+                    part.demand.nominal().get(),
+                    pressure.get()
+                )))
+            }
             Some(steady) => beyond_limits_or_model(part, side, steady.command),
             None => Ok(None),
         },
@@ -82,6 +92,9 @@ fn beyond_limits_or_model(
     }))
 }
 
+/// Two times that differ by less are the same \[s\].
+const SAME_S: f64 = 1e-9;
+
 /// Where a profile goes on before the fastest change has brought the command
 /// to its value. Its first value is no change.
 fn too_fast(part: &ExtruderPart, side: &ExtruderSide, played: &Played) -> Option<String> {
@@ -93,7 +106,7 @@ fn too_fast(part: &ExtruderPart, side: &ExtruderSide, played: &Played) -> Option
     for (pair, until_s) in steps {
         let [before, Point { from_s, value }] = pair else { continue };
         let takes_s = (value - before.value).abs() / rate;
-        if takes_s > until_s - from_s {
+        if takes_s > until_s - from_s + SAME_S {
             missed += 1;
             first.get_or_insert((*from_s, (value - before.value).abs(), takes_s, until_s - from_s));
         }
@@ -102,7 +115,7 @@ fn too_fast(part: &ExtruderPart, side: &ExtruderSide, played: &Played) -> Option
     let (unit, source) = (part.extruder.drive.unit_word(), side.file.as_ref()?.source.as_str());
     Some(format!(
         "{source}: {missed} of its changes are not made to their end: that of {by:.4} {unit} at \
-         {from_s:.2} s takes {takes_s:.3} s at max_{unit}_per_s = {rate}, and the next one comes \
-         after {has_s:.3} s"
+         {from_s:.2} s takes {takes_s:.3} s at max_{unit}_per_s = {rate}, and there are {has_s:.3} s \
+         until the next one or the end"
     ))
 }

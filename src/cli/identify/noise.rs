@@ -70,7 +70,8 @@ fn tell(column: &str, noise: &Noise, count: usize, step_s: Option<f64>) {
     say!("# {column}: {count} readings{every}");
     say!("sensor_noise_mpa = {:.3e}   # standard deviation of a reading", noise.sigma().get());
     say!(
-        "wander_mpa2 = {:.3e}        # variance that the pressure itself gains between two",
+        "wander_mpa2 = {:.3e}        # variance that the pressure itself gains between two readings; \
+         a cell that reads at another io_rate_hz takes it times the ratio of the intervals",
         noise.wander_mpa2()
     );
     if noise.wander_mpa2() > RESTLESS * noise.reading_mpa2() {

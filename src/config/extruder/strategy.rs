@@ -136,7 +136,7 @@ fn needs(table: &Table<'_>, about: &About<'_>, drive: Drive) {
 fn read_feedforward(table: &Table<'_>, about: &About<'_>) -> Option<FeedforwardKeys> {
     let model = read_model(table, about);
     // A screw that follows at once leaves no pole to be placed.
-    let time_constant = if matches!(model, Some(ModelSource::Screw(_))) {
+    let time_constant = if table.has("mm3_per_turn") {
         table.number_or("time_constant_s", 1e-3..=60.0, 1.0)
     } else {
         table.number("time_constant_s", 1e-3..=60.0)

@@ -44,7 +44,8 @@ impl Noise {
         if reading <= 0.01 * variance {
             return Err(PressureError::NoNoise { variance });
         }
-        Self::new(share * reading, reading)
+        // A share at the end of what was looked through is none.
+        Self::new(if share > NO_WANDER { share * reading } else { 0.0 }, reading)
     }
 
     /// Standard deviation of a reading.
@@ -102,6 +103,9 @@ impl Likelihood {
         Self { reading, log: -0.5 * (count * libm::log(reading) + logs) }
     }
 }
+
+/// Shares of the pressure's own steps below this are none.
+const NO_WANDER: f64 = 1e-7;
 
 /// Variance of the pressure's own step from reading to reading over that of a
 /// reading, between 1e-10 and 1e4, to a hundredth.

@@ -151,6 +151,31 @@ fn a_bead_that_no_extruder_answers_to_is_a_fault_within_the_longest_gap() {
 }
 
 #[test]
+fn a_pump_that_runs_on_does_not_hide_why_it_was_stopped() {
+    let high = |pump, mpa| {
+        Some(ExtruderReport { pressure_mpa: Some(MPa::constant(mpa)), ..report(pump, 30.0) })
+    };
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    bench.go(0.5);
+    bench.report = high(PumpMode::On, 2.1);
+    let stopped = ExtruderState::Fault(ExtruderFault::Overpressure);
+    assert_eq!(bench.go(0.5), stopped);
+    bench.laying = Laying::Stopped;
+    assert_eq!(bench.go(1.0), ExtruderState::Fault(ExtruderFault::RunsOn));
+    bench.report = high(PumpMode::Stopping, 1.0);
+    assert_eq!(bench.go(0.1), stopped);
+    bench.laying = Laying::Idle;
+    assert_eq!(bench.go(0.1), ExtruderState::Off);
+    // One that runs on at rest presses against no shut valve.
+    bench.report = high(PumpMode::On, 2.1);
+    bench.go(0.1);
+    assert!(bench.last().valve_open && !bench.last().pump_on);
+    // A link that comes back is no proof of anything.
+    bench.side.link_went_down(Stamp::from_secs(9.0));
+    assert_eq!(bench.side.state(), ExtruderState::Off);
+}
+
+#[test]
 fn a_pump_that_runs_on_is_a_fault_until_it_rests() {
     let runs_on = ExtruderState::Fault(ExtruderFault::RunsOn);
     let mut bench = Bench::new(Law::Constant(Constant(30.0)));

@@ -1,6 +1,6 @@
 //! What reports mean for the state: starts, holds, faults, and going on.
 
-use super::{Phase, Supervisor};
+use super::{Obedience, Phase, Supervisor};
 use crate::control::follow::Verdict;
 use crate::extruder::Drive;
 use crate::extruder::law::Need;
@@ -15,6 +15,9 @@ impl Supervisor {
     /// The extruder reported.
     pub fn reported(&mut self, now: Stamp, report: &ExtruderReport) {
         self.link_up = true;
+        if self.heard.is_some_and(|at| now - at > self.setup.max_gap) {
+            self.readings.forget();
+        }
         let seen = self.readings.pass(report);
         self.report = Some((now, seen));
         self.heard = Some(now);
@@ -48,23 +51,30 @@ impl Supervisor {
     fn see_whether_it_rests(&mut self, now: Stamp, pump: PumpMode) {
         let runs = matches!(pump, PumpMode::On | PumpMode::Starting);
         let told_to_rest = self.told.is_some_and(|told| !told.pump_on);
-        self.runs_on = if runs && told_to_rest { self.runs_on.or(Some(now)) } else { None };
-        if self.runs_on.is_some_and(|since| now - since > self.setup.max_hold) {
-            self.phase = Phase::Fault(ExtruderFault::RunsOn);
-        } else if !runs && self.phase == Phase::Fault(ExtruderFault::RunsOn) {
-            self.phase = Phase::Off;
+        if !(runs && told_to_rest) {
+            self.obedience = Obedience::Obeys;
+            return;
         }
+        let since = match self.obedience {
+            Obedience::Obeys => now,
+            Obedience::RunsOn { since } | Obedience::Lost { since } => since,
+        };
+        self.obedience = if now - since > self.setup.max_hold {
+            Obedience::Lost { since }
+        } else {
+            Obedience::RunsOn { since }
+        };
     }
 
     /// Whether the pressure is too high. A valve that was opened for it stays
     /// open until a report says that it has fallen, whatever the state; only one
-    /// of an extruder that was at work is opened.
+    /// of an extruder that is at work, told or not, is opened.
     fn relieve(&mut self, report: &ExtruderReport) -> bool {
         let Some((limit, found)) = self.setup.max_pressure.zip(report.pressure_mpa) else {
             return false;
         };
         let too_high = found > limit;
-        if too_high && self.phase != Phase::Off {
+        if too_high && (self.phase != Phase::Off || self.obedience != Obedience::Obeys) {
             self.relieving = true;
         } else if found.get() < FALLEN * limit.get() {
             self.relieving = false;

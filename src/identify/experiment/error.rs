@@ -87,6 +87,25 @@ pub enum ExperimentError {
         /// Its value.
         value: f64,
     },
+    /// A column that does not move in one of the parts that a log is cut into.
+    #[error(
+        "the {side} is {} all the time from {from_s:.1} s to {to_s:.1} s, the part that is {}: \
+         cut the log elsewhere (--validate-share, --to-s), or name another one to validate with \
+         (--validate)", short(*.value),
+        if *.validates { "kept to validate with" } else { "fitted to" }
+    )]
+    ConstantPart {
+        /// Which one.
+        side: Side,
+        /// Its value.
+        value: f64,
+        /// Beginning of the part \[s\].
+        from_s: f64,
+        /// End of the part \[s\].
+        to_s: f64,
+        /// Whether it is the part to validate with.
+        validates: bool,
+    },
     /// A few samples far beyond all others.
     #[error(
         "the {side} is {} at sample {}{}, and all others lie between {} and {}: that is no reading. \

@@ -42,6 +42,10 @@ fn the_last_part_validates() {
     let (fit, rest) = taken(&columns()).unwrap().split(0.3).unwrap();
     assert_eq!((fit.len(), rest.len()), (700, 300));
     assert!((rest.start_s - 7.0).abs() < 1e-6);
+    let mut stands = columns();
+    stands[1][650..].fill(30.0);
+    let said = taken(&stands).unwrap().split(0.3).unwrap_err().to_string();
+    assert!(said.contains("from 7.0 s to 10.0 s, the part that is kept to validate"), "{said}");
     let short = taken(&columns()).unwrap().split(0.04).unwrap_err();
     assert!(short.to_string().contains("40 samples are left to validate with: 50"), "{short}");
     assert!(matches!(

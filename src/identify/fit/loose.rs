@@ -82,7 +82,7 @@ impl fmt::Display for Loose {
             Self::DeadTime { dead_time_s, sigma_s } => write!(
                 f,
                 "the data do not tell the dead time: {dead_time_s:.3} s with a standard error of \
-                 {sigma_s:.3} s, longer than itself and than the fastest time constant"
+                 {sigma_s:.3} s, longer than itself and than the slowest time constant"
             ),
             Self::Together { names, pair } => {
                 match names.split_last() {
@@ -136,14 +136,14 @@ pub(super) fn loose(
     Some(Loose::Together { names, pair: pair(problem, theta) })
 }
 
-/// A dead time whose standard error is beyond itself and beyond the fastest time
+/// A dead time whose standard error is beyond itself and beyond the slowest time
 /// constant, which no controller could go by.
 fn loose_dead_time(problem: &Problem, theta: &[f64], spread: &Spread) -> Option<Loose> {
     let place = problem.layout().dead_time?;
     let (dead_time_s, sigma_s) = (theta[place], spread.coloured[(place, place)].max(0.0).sqrt());
     let poles = polynomial::roots(&problem.den(theta));
-    let fastest_s = poles.iter().map(|pole| 1.0 / pole.norm()).fold(f64::INFINITY, f64::min);
-    let is_loose = sigma_s.is_nan() || sigma_s > dead_time_s.max(fastest_s);
+    let slowest_s = poles.iter().map(|pole| 1.0 / pole.norm()).fold(0.0, f64::max);
+    let is_loose = sigma_s.is_nan() || sigma_s > dead_time_s.max(slowest_s);
     is_loose.then_some(Loose::DeadTime { dead_time_s, sigma_s })
 }
 

@@ -49,6 +49,13 @@ impl Study {
         doubts.extend(self.short_validation());
         doubts.extend(self.short_record());
         doubts.extend(of_drift(&self.fit, &self.logs));
+        let (gain, input, output) =
+            (self.fit.model.dc_gain(), self.logs.input.unit, self.logs.output.unit);
+        if gain < 0.0 {
+            doubts.push(format!(
+                "the gain is {gain:.4}, less {output} from more {input}: look at the sign of a column"
+            ));
+        }
         let outside = self.residuals.share_outside();
         if outside > 0.05 {
             doubts.push(format!(

@@ -2,7 +2,8 @@
 
 use maud::{Markup, html};
 
-use crate::offline::names::spoken;
+use crate::extruder::ExtruderFault;
+use crate::offline::names::{extruder_fault, spoken};
 use crate::offline::summary::{ControlSummary, ExtruderSummary, ProfileSummary, Summary};
 
 /// Share of what was wanted from which on an error is worth a word.
@@ -47,7 +48,7 @@ pub fn verdict(summary: &Summary, max_rejected_share: f64) -> Verdict {
         sentences.extend(more);
         if let Some(sentence) = far_off(control, summary) {
             level = level.max(Level::Caution);
-            // Right behind the error that it speaks of.
+            // Right behind the sentence about the width.
             sentences.insert(1, sentence);
         }
     }
@@ -121,6 +122,8 @@ fn share_sentence(summary: &Summary, max_rejected_share: f64) -> String {
     let of_bead = if frames == summary.frames { "" } else { " that could show bead" };
     if summary.frames == 0 {
         "There was no frame at all.".to_string()
+    } else if frames == 0 {
+        "No frame could show bead: none was laid.".to_string()
     } else if summary.rejected_share() > max_rejected_share {
         format!(
             "Only {share:.1} % of {frames} frames{of_bead} were measured; the cell asks for {:.0} %.",
@@ -150,6 +153,9 @@ fn extruder_sentences(extruder: &ExtruderSummary) -> Vec<String> {
     let total: f64 = extruder.states_s.values().sum();
     let share = |seconds: f64| seconds / total.max(1e-9);
     let mut sentences = Vec::new();
+    if extruder.fault_reasons.contains_key(&extruder_fault(ExtruderFault::RunsOn)) {
+        sentences.push("The pump ran although it was told to stop.".to_owned());
+    }
     for (why, seconds) in &extruder.held_for_s {
         sentences.push(format!(
             "The extruder kept its last command for {seconds:.1} s ({}).",

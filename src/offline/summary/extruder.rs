@@ -109,7 +109,7 @@ impl ExtruderTally {
             self.spend(now - since, state, limit);
         }
         if let ExtruderState::Fault(why) = side.state
-            && !matches!(self.last, Some((_, ExtruderState::Fault(_), _)))
+            && self.last.is_none_or(|(_, last, _)| last != side.state)
         {
             self.count(why);
         }

@@ -1,0 +1,52 @@
+//! The gain once a straight line in time is taken off input and output. The
+//! line of a drift goes with it, and what the output owes to the input stays:
+//! where the output does not drift, both gains are the same but for noise
+//! (a specification test in the sense of Hausman 1978).
+
+use super::{Before, Fit, FitError, Samples, Settings, Structure, fit};
+
+/// The gain without a straight line in time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SteadyGain {
+    /// Output for each unit of the input.
+    pub gain: f64,
+    /// Its standard error.
+    pub sigma: f64,
+}
+
+impl SteadyGain {
+    /// By a model of second order, or of first where the data show no more; none
+    /// where neither can be told, as where the input is a line itself.
+    pub fn of(samples: &Samples, settings: &Settings) -> Option<Self> {
+        let (input, output) = (level(samples.input()), level(samples.output()));
+        let levelled = Samples::new(input, output, samples.dt_s()).ok()?;
+        let forms = [
+            Structure::SecondOrderOscillating { zero: false },
+            Structure::FirstOrder { zero: false },
+        ];
+        let fitted = |structure| -> Result<Fit, FitError> {
+            fit(&levelled, &Settings { structure, before: Before::Unknown, ..*settings })
+        };
+        let found = forms.into_iter().find_map(|form| fitted(form).ok())?;
+        let gain = found.parameter("gain")?;
+        Some(Self { gain: gain.value, sigma: gain.sigma })
+    }
+
+    /// By how many standard errors another gain differs, and by what share.
+    pub fn apart(&self, gain: f64) -> (f64, f64) {
+        let by = (gain - self.gain).abs();
+        (by / self.sigma, by / self.gain.abs())
+    }
+}
+
+/// A row about the line that is nearest to it.
+fn level(row: &[f64]) -> Vec<f64> {
+    let slope = super::Trend::of(row).rise / as_f64(row.len().saturating_sub(1).max(1));
+    let middle = 0.5 * as_f64(row.len().saturating_sub(1));
+    row.iter().enumerate().map(|(k, value)| value - slope * (as_f64(k) - middle)).collect()
+}
+
+#[expect(clippy::cast_precision_loss, reason = "counts of samples")]
+fn as_f64(count: usize) -> f64 {
+    count as f64
+}
