@@ -175,6 +175,7 @@ fn readings_are_filtered_before_the_strategy_goes_by_them() {
         ("", "extruder.readings.spike_half_width"),
         ("smooth_window = 8", "expected an odd number from 3 to 101"),
         ("spike_half_width = 0", "extruder.readings.spike_half_width"),
+        ("smooth_window = 9\nspike_sigmas = 3.0", "spike_half_width beside it"),
         ("smooth_windw = 9\nspike_half_width = 2", "smooth_windw"),
     ] {
         let (status, said, _) = with(wrong);
@@ -342,6 +343,7 @@ fn a_screw_that_was_weighed_needs_no_model() {
     for (wrong, told) in [
         (format!("{weighed}\nmodel = \"m.toml\""), "one of model, library and mm3_per_turn"),
         (weighed.replace("78000.0", "-1.0"), "extruder.mm3_per_turn"),
+        (format!("{weighed}\nmaterial = \"PLA\""), "mm3_per_turn stands in for a model"),
     ] {
         let (status, said) = checked(&[(constant, &wrong)]);
         assert!(status == Some(2) || said.contains("not for run"), "{said}");

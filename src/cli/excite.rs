@@ -87,11 +87,22 @@ struct GaussianArgs {
     all: All,
 }
 
+fn parse_level(text: &str) -> Result<f64, String> {
+    let level = text.trim().parse::<f64>().ok().filter(|level| level.is_finite());
+    level.ok_or_else(|| "expected numbers with a comma between them, such as 20,40,30".to_owned())
+}
+
 /// Levels that are told, one after the other
 #[derive(Debug, Args)]
 struct StepsArgs {
     /// The levels, such as 20,40,30
-    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, required = true)]
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_parser = parse_level,
+        allow_hyphen_values = true,
+        required = true
+    )]
     levels: Vec<f64>,
     #[command(flatten)]
     all: All,

@@ -10,6 +10,9 @@ use crate::io::recording::{Entry, RecordingError};
 use crate::time::Stamp;
 use crate::units::{MPa, Mm, Mm3PerS, MmPerS, Rpm};
 
+/// Name of the command's column, before its unit.
+pub const COMMAND: &str = "command";
+
 /// What has to be known of the cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facts {
@@ -96,7 +99,7 @@ impl Found {
         let measured = |name: &str| Series::new(name, false);
         let unit = facts.command.unwrap_or(Unit::One).word();
         Self {
-            command: Series::new(format!("command_{unit}"), true),
+            command: Series::new(format!("{COMMAND}_{unit}"), true),
             reported: ["screw_rpm", "pressure_mpa", "flow_mm3_per_s", "filled_mm"].map(measured),
             speed: measured("speed_mm_per_s"),
             path: measured("path_mm"),

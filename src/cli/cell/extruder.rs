@@ -20,11 +20,9 @@ use crate::io::model_file;
 use crate::io::record::ExtruderFile;
 use crate::io::record::format::{MODEL_ATTACHMENT, PROFILE_ATTACHMENT};
 use crate::model::TransferFunction;
+use crate::offline::recorded::COMMAND;
 use crate::time::Span;
 use crate::units::Rpm;
-
-/// What `identify` calls the command of a recording, before its unit.
-const COMMAND: &str = "command";
 
 /// What the strategy's file is called in a recording; none where it has none.
 pub fn attachment(strategy: &Strategy) -> Option<&'static str> {

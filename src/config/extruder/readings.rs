@@ -20,6 +20,14 @@ pub(super) fn read(table: &Table<'_>) -> Option<ReadingFilters> {
         table.report("spike_half_width", "nothing", expected);
         return None;
     }
+    for (key, filter, needed) in [
+        ("spike_sigmas", spikes.is_some(), "spike_half_width beside it"),
+        ("smooth_degree", smoothing.is_some(), "smooth_window beside it"),
+    ] {
+        if table.has(key) && !filter {
+            table.report(key, "a number without its filter", needed);
+        }
+    }
     // What was asked for and cannot be was reported.
     if spikes == Some(None) || smoothing == Some(None) {
         return None;

@@ -176,6 +176,10 @@ fn read_turn(table: &Table<'_>, about: &About<'_>) -> Option<DragFlow> {
         table.report("mm3_per_turn", "a volume beside a model", expected);
         table.pass_over();
     }
+    for key in LOOKED_UP_BY.into_iter().filter(|key| table.has(key)) {
+        let expected = "nothing here: mm3_per_turn stands in for a model; leave one of them out";
+        table.report(key, "a key of a library beside mm3_per_turn", expected);
+    }
     if about.drive != Drive::Rpm {
         let expected = "a model, or command = \"rpm\", which turns a screw";
         table.report("mm3_per_turn", "a volume for each turn", expected);

@@ -22,6 +22,16 @@ pub enum ProfileFileError {
         /// Those that are there.
         found: Vec<String>,
     },
+    /// Time that does not run on.
+    #[error("line {line}: time_s is {time_s}, and {before_s} the line before: time runs on")]
+    Order {
+        /// Line of the file, counted from 1.
+        line: u64,
+        /// Its time \[s\].
+        time_s: f64,
+        /// That of the one before it \[s\].
+        before_s: f64,
+    },
     /// It has too few lines.
     #[error("a profile has two lines or more: each value with its time, and the end")]
     Short,
@@ -38,6 +48,10 @@ pub fn parse(text: &str) -> Result<(Profile, Quantity), ProfileFileError> {
     let quantity = Quantity::of_column(column, None).filter(|_| time == TIME).ok_or_else(other)?;
     let times = table.column(time)?;
     let values = table.column(column)?;
+    if let Some(at) = times.windows(2).position(|pair| pair[1] <= pair[0]) {
+        let [before_s, time_s] = [times[at], times[at + 1]];
+        return Err(ProfileFileError::Order { line: table.line(at + 1), time_s, before_s });
+    }
     let (Some((end_s, begins)), true) = (times.split_last(), times.len() > 1) else {
         return Err(ProfileFileError::Short);
     };
@@ -82,7 +96,7 @@ mod tests {
         assert!(said("time_s,speed\n0,1\n1,1\n").contains("the columns are time_s, speed"));
         assert!(said("time_ms,rpm\n0,1\n1,1\n").contains("expected time_s"));
         assert!(said("time_s,rpm\n0,1\n").contains("two lines or more"));
-        assert!(said("time_s,rpm\n0,1\n2,3\n2,3\n").contains("ends at 2 s"));
+        assert!(said("time_s,rpm\n0,1\n2,3\n2,3\n").contains("line 4: time_s is 2, and 2"));
         assert!(said("time_s,rpm\n0,1\n1,fast\n2,1\n").contains("line 3, column rpm"));
     }
 }
