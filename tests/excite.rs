@@ -3,23 +3,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
+mod common;
+
 use std::fs;
 
-use assert_cmd::Command;
 use truebead::identify::profile::file::parse;
 
-fn truebead(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_truebead"));
-    command.args(args);
-    command
-}
-
-fn said(command: &mut Command, code: i32) -> String {
-    let run = command.assert().code(code);
-    let output = run.get_output();
-    let text = if code == 0 { &output.stdout } else { &output.stderr };
-    String::from_utf8_lossy(text).into_owned()
-}
+use common::{said, truebead};
 
 #[test]
 fn profiles_are_written_as_a_cell_plays_them() {

@@ -3,6 +3,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
+mod common;
+
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,18 +14,7 @@ use truebead::identify::file;
 use truebead::sim::hash::{mix, normal_pair};
 use truebead::sim::logged;
 
-fn truebead(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_truebead"));
-    command.args(args);
-    command
-}
-
-fn said(command: &mut Command, code: i32) -> String {
-    let run = command.assert().code(code);
-    let output = run.get_output();
-    let text = if code == 0 { &output.stdout } else { &output.stderr };
-    String::from_utf8_lossy(text).into_owned()
-}
+use common::{said, truebead};
 
 /// The command for a log in a folder, which finds one form quickly.
 fn identify(log: &Path, more: &[&str]) -> Command {

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
 
+mod common;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -13,23 +15,14 @@ use truebead::geometry::Pose;
 use truebead::sim::boards::{BoardStudio, Exposure};
 use truebead::units::Mm;
 
+use common::{said, truebead};
+
 const SIZE: [u32; 2] = [640, 480];
 
-fn truebead() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_truebead"))
-}
-
 fn offset(input: &Path, more: &[&str]) -> Command {
-    let mut command = truebead();
-    command.arg("offset").arg(input).args(more);
+    let mut command = truebead(&["offset"]);
+    command.arg(input).args(more);
     command
-}
-
-fn said(command: &mut Command, code: i32) -> String {
-    let run = command.assert().code(code);
-    let output = run.get_output();
-    let text = if code == 0 { &output.stdout } else { &output.stderr };
-    String::from_utf8_lossy(text).into_owned()
 }
 
 /// The line for the cell file.
@@ -55,7 +48,7 @@ fn is_the_demos(answer: &str) -> bool {
 fn a_demo_tells_the_offset_of_its_cell() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("demo");
-    truebead().args(["-q", "demo", "--seconds", "11", "--out"]).arg(&out).assert().success();
+    truebead(&["-q", "demo", "--seconds", "11", "--out"]).arg(&out).assert().success();
     let recording = out.join("recording.mcap");
     let answer = said(&mut offset(&recording, &[]), 0);
     assert!(is_the_demos(&answer) && answer.contains("has offset_mm = 88.4"), "{answer}");

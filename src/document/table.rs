@@ -139,7 +139,7 @@ impl Drop for Table<'_> {
             }
             let line = self.document.line_of(key.span().start);
             let likely = asked.iter().filter(|known| alike(known, name));
-            let near = likely.max_by_key(|known| in_common(known, name));
+            let near = likely.max_by_key(|known| in_common(known, name).iter().sum::<usize>());
             let expected = match near {
                 Some(known) => format!("\"{known}\"?"),
                 None if asked.is_empty() => "nothing here".to_string(),
@@ -150,18 +150,17 @@ impl Drop for Table<'_> {
     }
 }
 
-/// Letters that two keys share at their beginnings and their ends.
-fn in_common(known: &str, found: &str) -> usize {
-    let shared = known.bytes().zip(found.bytes()).take_while(|(a, b)| a == b).count();
-    let tail = known.bytes().rev().zip(found.bytes().rev()).take_while(|(a, b)| a == b).count();
-    shared + tail
+/// Letters that two keys share at their beginnings, and at their ends.
+fn in_common(known: &str, found: &str) -> [usize; 2] {
+    let beginning = known.bytes().zip(found.bytes()).take_while(|(a, b)| a == b).count();
+    let end = known.bytes().rev().zip(found.bytes().rev()).take_while(|(a, b)| a == b).count();
+    [beginning, end]
 }
 
 /// Whether an unknown key looks like a known one that was mistyped: same
 /// beginning, or the same letters but for one or two.
 fn alike(known: &str, found: &str) -> bool {
-    let shared = known.bytes().zip(found.bytes()).take_while(|(a, b)| a == b).count();
-    let tail = known.bytes().rev().zip(found.bytes().rev()).take_while(|(a, b)| a == b).count();
+    let [beginning, end] = in_common(known, found);
     let longest = known.len().max(found.len());
-    shared + tail + 2 >= longest || (shared >= 6 && shared * 2 >= longest)
+    beginning + end + 2 >= longest || (beginning >= 6 && beginning * 2 >= longest)
 }

@@ -214,11 +214,10 @@ impl Supervisor {
     /// The run is being ended: the pump stops now.
     pub fn stop(&mut self) -> Option<ExtruderCommand> {
         self.rest();
-        let command = self.command();
         if !self.link_up {
             return None;
         }
-        self.told = Some(command);
+        self.told = Some(self.command());
         self.told
     }
 

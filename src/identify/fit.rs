@@ -51,7 +51,7 @@ pub use quality::Quality;
 pub use report::{Fit, Note, Parameter};
 pub use samples::{Samples, SamplesError};
 pub use settings::{Before, DeadTime, Level, Settings, Structure};
-pub use trend::Trend;
+pub use trend::{DOMINATES, Trend};
 
 use crate::model::Between;
 use problem::Problem;

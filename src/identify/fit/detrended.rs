@@ -3,7 +3,7 @@
 //! where the output does not drift, both gains are the same but for noise
 //! (a specification test in the sense of Hausman 1978).
 
-use super::{Before, Fit, FitError, Samples, Settings, Structure, fit};
+use super::{Before, Fit, FitError, Samples, Settings, Structure, Trend, fit};
 
 /// The gain without a straight line in time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,6 +18,7 @@ impl SteadyGain {
     /// By a model of second order, or of first where the data show no more; none
     /// where neither can be told, as where the input is a line itself.
     pub fn of(samples: &Samples, settings: &Settings) -> Option<Self> {
+        let level = |row: &[f64]| Trend::of(row).taken_off(row);
         let (input, output) = (level(samples.input()), level(samples.output()));
         let levelled = Samples::new(input, output, samples.dt_s()).ok()?;
         let forms = [
@@ -37,16 +38,4 @@ impl SteadyGain {
         let by = (gain - self.gain).abs();
         (by / self.sigma, by / self.gain.abs())
     }
-}
-
-/// A row about the line that is nearest to it.
-fn level(row: &[f64]) -> Vec<f64> {
-    let slope = super::Trend::of(row).rise / as_f64(row.len().saturating_sub(1).max(1));
-    let middle = 0.5 * as_f64(row.len().saturating_sub(1));
-    row.iter().enumerate().map(|(k, value)| value - slope * (as_f64(k) - middle)).collect()
-}
-
-#[expect(clippy::cast_precision_loss, reason = "counts of samples")]
-fn as_f64(count: usize) -> f64 {
-    count as f64
 }

@@ -3,17 +3,14 @@
 use super::error::FitError;
 use super::problem::{Problem, dot};
 use super::report::Fit;
-use super::trend::Trend;
-
-/// A line that explains more than this share of a row dominates it.
-const MOST: f64 = 0.5;
+use super::trend::{DOMINATES, Trend};
 
 /// Refuses a model of an output that a straight line in time dominates, and not
 /// the input, where the model tells no more than that line, or follows it with a
 /// time constant that the record is too short to show.
 pub(super) fn check_drift(problem: &Problem, fit: &Fit) -> Result<(), FitError> {
     let line = Trend::of(&problem.output);
-    if line.share < MOST || Trend::of(&problem.input).share > MOST {
+    if line.share < DOMINATES || Trend::of(&problem.input).share > DOMINATES {
         return Ok(());
     }
     let record_s = problem.duration_s();

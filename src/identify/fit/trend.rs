@@ -6,6 +6,8 @@ use super::spread::Colour;
 const SEEN: f64 = 15.0;
 /// A smaller share of a row is of no account.
 const SMALL: f64 = 0.1;
+/// A line that explains more than this share of a row dominates it.
+pub const DOMINATES: f64 = 0.5;
 
 /// The line that is nearest to a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,6 +41,13 @@ impl Trend {
         Self { share: explained / whole, rise: slope * (n - 1.0), squares: whole - explained }
     }
 
+    /// A row without its line; the row's mean stays.
+    pub fn taken_off(&self, row: &[f64]) -> Vec<f64> {
+        let last = as_f64(row.len().max(2)) - 1.0;
+        let slope = self.rise / last;
+        row.iter().enumerate().map(|(k, value)| value - slope * (as_f64(k) - 0.5 * last)).collect()
+    }
+
     /// The line through a row where it is more than chance: more than a tenth of
     /// the row, and more than as few samples would show as what it leaves says as
     /// much as.
@@ -47,11 +56,8 @@ impl Trend {
         if trend.share < SMALL {
             return None;
         }
-        let n = as_f64(row.len().max(2));
-        let (mean, slope) = (row.iter().sum::<f64>() / n, trend.rise / (n - 1.0));
-        let about =
-            |(k, value): (usize, &f64)| value - mean - slope * (as_f64(k) - 0.5 * (n - 1.0));
-        let left: Vec<f64> = row.iter().enumerate().map(about).collect();
+        let mean = row.iter().sum::<f64>() / as_f64(row.len().max(1));
+        let left: Vec<f64> = trend.taken_off(row).iter().map(|value| value - mean).collect();
         let ratio = trend.share / (1.0 - trend.share).max(f64::MIN_POSITIVE)
             * Colour::of(&left).independent(left.len());
         (ratio > SEEN).then_some(trend)
@@ -89,6 +95,7 @@ mod tests {
         let found = Trend::of(&line);
         assert!((found.share - 1.0).abs() < 1e-12 && (found.rise + 20.0).abs() < 1e-9);
         assert!(found.squares < 1e-9);
+        assert!(found.taken_off(&line).iter().all(|value| (value + 7.0).abs() < 1e-9));
         assert_eq!(Trend::of(&[4.0; 9]), Trend { share: 0.0, rise: 0.0, squares: 0.0 });
         assert_eq!(Trend::of(&[]).share, 0.0);
     }

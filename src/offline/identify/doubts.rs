@@ -2,7 +2,7 @@
 
 use super::{Logs, Study};
 use crate::identify::experiment::Experiment;
-use crate::identify::fit::{Fit, Note, Trend};
+use crate::identify::fit::{DOMINATES, Fit, Note, Trend};
 use crate::identify::number::brief;
 
 /// A model that is further off other data than off its own by this factor is
@@ -14,8 +14,6 @@ const POOR_PERCENT: f64 = 50.0;
 const TIME_CONSTANTS: f64 = 5.0;
 /// A record shorter than so many of the slowest time constants shows no end of it.
 const RECORD_TIME_CONSTANTS: f64 = 3.0;
-/// A line that explains more than this share of an output dominates it.
-const DOMINATES: f64 = 0.5;
 
 impl Study {
     /// What the reader should know before the model is used.
