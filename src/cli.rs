@@ -39,6 +39,7 @@ pub mod models;
 pub mod offset;
 pub mod outcome;
 pub mod process;
+pub mod recorded;
 pub mod render;
 pub mod replay;
 pub mod reproduce;

@@ -3,23 +3,28 @@
 //!
 //! - idle: the robot is not printing.
 //! - priming: first stretch of a bead, at the start speed.
-//! - tracking: the PI law corrects the speed, once a width of this bead has
-//!   been seen.
+//! - tracking: the width is held by distance, or by the PI law, once a width of
+//!   this bead has been seen.
 //! - holding: the speed stays as it is, for a reason; left when the reason
 //!   goes, and a fault when it stays too long.
 //! - fault: the robot is told to stop; left when the robot is idle again.
 
+mod by_distance;
 mod extrude;
 mod robot;
 mod track;
 
 use extrude::ExtruderSide;
 
+use crate::calib::Calibration;
+use crate::config::Cell;
 use crate::config::cell::RunPart;
-use crate::config::control::Control;
+use crate::config::control::{Control, WidthLaw};
+use crate::control::distance::{ByDistance, DistanceSettings, Distrust};
 use crate::control::follow::{Follow, Verdict};
 use crate::control::limiter::Limits;
-use crate::control::pi::Pi;
+use crate::control::odometer::Odometer;
+use crate::control::pi::{Pi, PiGains};
 use crate::control::transport::Transport;
 use crate::control::{
     Command, Event, Fault, Hold, Limit, RobotMode, RobotState, State, Step, Trace,
@@ -32,7 +37,7 @@ use crate::units::{Mm, MmPerS};
 const HOLD_TIME: Span = Span::from_millis(1000);
 
 /// Everything the controller has to know of its cell.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Setup {
     /// Target, gains and patience.
     pub control: Control,
@@ -46,18 +51,52 @@ pub struct Setup {
     pub camera_offset: Mm,
     /// How long a robot that hears nothing lays bead before it stops by itself.
     pub alone_for: Span,
+    /// Time between two setpoints.
+    pub setpoint_period: Span,
+    /// What the law by distance is told, where the width is held by it.
+    pub distance: Option<DistanceSettings>,
 }
 
-impl From<&RunPart> for Setup {
-    fn from(run: &RunPart) -> Self {
+impl Setup {
+    /// As a cell describes it, with the calibration that says how long the
+    /// gauge is.
+    pub fn of(cell: &Cell, run: &RunPart, calibration: &Calibration) -> Self {
+        let distance = match run.control.law {
+            WidthLaw::Pi => None,
+            WidthLaw::Distance(exponent) => Some(DistanceSettings {
+                offset: run.camera.offset,
+                offset_sigma: run.camera.offset_sigma,
+                gauge: cell.gauge_length(calibration),
+                reference_speed: run.robot.start_speed,
+                exponent: exponent.value,
+                learns_exponent: exponent.learns,
+                drift_per_root_m: exponent.drift_per_root_m,
+            }),
+        };
         Self {
-            control: run.control,
+            control: run.control.clone(),
             limits: run.limits,
             start_speed: run.robot.start_speed,
             start_length: run.robot.start_length,
             camera_offset: run.camera.offset,
             alone_for: Span::from_millis(i64::from(run.robot.valid_ms)) + HOLD_TIME,
+            setpoint_period: Span::from_secs(1.0 / run.robot.rate_hz),
+            distance,
         }
+    }
+
+    /// Gains of the PI law: those of the cell or, where it gives none because
+    /// the law is only fallen back to, an integral that the dead time from
+    /// nozzle to camera allows for the bead that the law by distance was told
+    /// of (internal model control with twice the dead time as the lag).
+    fn gains(&self) -> PiGains {
+        let exponent = self.distance.map_or(1.0, |told| told.exponent);
+        let speed = self.start_speed.max(MmPerS::constant(1.0));
+        let slope = exponent * self.control.target.nominal().get() / speed.get();
+        let dead_s = self.camera_offset / (speed * Span::from_secs(1.0));
+        let dead_s = dead_s + self.setpoint_period.secs();
+        let spare = PiGains { kp_per_s: 0.0, ki_per_s2: 1.0 / (3.0 * dead_s * slope.max(1e-6)) };
+        self.control.gains.unwrap_or(spare)
     }
 }
 
@@ -66,9 +105,18 @@ impl From<&RunPart> for Setup {
 enum Phase {
     Idle,
     Priming,
-    Tracking { pi: Pi, seen_at: Stamp, demand: MmPerS },
+    Tracking { by: Steering, seen_at: Stamp },
     Holding { since: Stamp, why: Hold },
     Fault { why: Fault },
+}
+
+/// What sets the speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Steering {
+    /// The PI law, with what it would like now.
+    Pi { pi: Pi, demand: MmPerS },
+    /// The law by distance.
+    Distance,
 }
 
 /// The controller of a cell: the width by the robot's speed and, where the
@@ -83,6 +131,11 @@ pub struct Controller {
     link_up: bool,
     robot: Option<RobotState>,
     transport: Transport,
+    odometer: Odometer,
+    /// The law by distance, where the cell asks for it.
+    distance: Option<Box<ByDistance>>,
+    /// Why it is not followed on this bead.
+    fallback: Option<Distrust>,
     follow: Follow,
     verdict: Verdict,
     /// Where on the path the bead began.
@@ -97,6 +150,7 @@ pub struct Controller {
 impl Controller {
     /// A controller that has seen nothing yet.
     pub fn new(setup: Setup) -> Self {
+        let distance = setup.distance.map(|told| Box::new(ByDistance::new(told)));
         Self {
             setup,
             extruder: None,
@@ -105,6 +159,9 @@ impl Controller {
             link_up: false,
             robot: None,
             transport: Transport::default(),
+            odometer: Odometer::default(),
+            distance,
+            fallback: None,
             follow: Follow::default(),
             verdict: Verdict::Follows,
             bead_start: Mm::ZERO,
@@ -138,9 +195,9 @@ impl Controller {
     fn steer(&mut self, now: Stamp, event: &Event) -> Step {
         let mut trace = Trace::default();
         let command = match event {
-            Event::Measured { frame, captured_at, width_mm, .. } => {
+            Event::Measured { frame, captured_at, width_mm, sigma_mm } => {
                 trace.frame = Some(*frame);
-                self.measured(*captured_at, *width_mm, &mut trace);
+                self.measured(*captured_at, (*width_mm, *sigma_mm), &mut trace);
                 None
             }
             Event::Rejected { frame, captured_at, .. } => {
@@ -184,6 +241,7 @@ impl Controller {
             }
         };
         trace.limit = self.limit;
+        trace.fallback = self.fallback;
         Step { command, state: self.state(), trace, extruder: None }
     }
 
@@ -204,12 +262,17 @@ impl Controller {
         if !self.link_up || !matches!(mode, RobotMode::Print | RobotMode::Hold) || self.ended {
             return None;
         }
+        self.begin_by_distance(now);
+        let kept = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
         let speed = match &self.phase {
             Phase::Idle => return None,
             Phase::Fault { .. } => return Some(Command::Stop),
             Phase::Priming => self.setup.start_speed,
-            Phase::Tracking { demand, .. } => *demand,
-            Phase::Holding { .. } => self.told.map_or(self.setup.start_speed, |(_, speed)| speed),
+            Phase::Tracking { by: Steering::Pi { demand, .. }, .. } => *demand,
+            Phase::Tracking { by: Steering::Distance, .. } => {
+                self.speed_by_distance(now).unwrap_or(kept)
+            }
+            Phase::Holding { .. } => kept,
         };
         trace.demand_mm_per_s = Some(speed);
         // A hold keeps the speed as it is, whatever flows.
@@ -230,12 +293,12 @@ impl Controller {
 
     /// Holds when widths stay out, and gives up when a hold lasts too long.
     fn lose_patience(&mut self, now: Stamp) {
-        let control = self.setup.control;
+        let (max_gap, max_hold) = (self.setup.control.max_gap, self.setup.control.max_hold);
         match &self.phase {
-            Phase::Tracking { seen_at, .. } if now - *seen_at > control.max_gap => {
+            Phase::Tracking { seen_at, .. } if now - *seen_at > max_gap => {
                 self.phase = Phase::Holding { since: now, why: Hold::NoWidth };
             }
-            Phase::Holding { since, why } if !self.ended && now - *since > control.max_hold => {
+            Phase::Holding { since, why } if !self.ended && now - *since > max_hold => {
                 self.phase = Phase::Fault { why: Fault::HeldTooLong(why.clone()) };
             }
             _ => {}

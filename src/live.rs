@@ -162,7 +162,7 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         .extruder
         .as_ref()
         .map(|side| ExtruderWatch::new(side.config(), side.setup.feedforward_period));
-    let mut controller = Controller::new(Setup::from(&live.run));
+    let mut controller = Controller::new(Setup::of(&live.cell, &live.run, &live.calibration));
     if let Some(side) = live.extruder {
         controller = controller.with_extruder(side.setup, side.demand);
     }

@@ -50,7 +50,7 @@ channel = "grey"
 target_width_mm = 42.0
 "#;
     let cell = Cell::parse(Path::new("x/cell.toml"), text, Purpose::Measure).unwrap();
-    assert_eq!(cell.target.unwrap().get(), 42.0);
+    assert_eq!(cell.target.unwrap().nominal().get(), 42.0);
     assert_eq!(cell.calibration, CalibrationSource::File("x/calib/cell.toml".into()));
 }
 

@@ -11,6 +11,7 @@ use crossbeam_channel::{Sender, bounded};
 use super::cell::LoadedCell;
 use super::{Voice, WITH_LOSS, WrongArguments};
 use crate::config::cell::Purpose;
+use crate::control::target::Target;
 use crate::io::camera::mcap::RobotZ;
 use crate::io::camera::open::{self, OfflineOptions};
 use crate::io::stop::StopSignal;
@@ -73,7 +74,7 @@ pub fn run(args: &ProcessArgs, voice: Voice) -> anyhow::Result<ExitCode> {
             ("calibration".into(), loaded.calibration_words()),
         ],
         gauge: loaded.cell.gauge,
-        target: loaded.cell.target,
+        target: loaded.cell.target.as_ref().map(Target::nominal),
         max_rejected_share: loaded.cell.recording.max_rejected_share,
         control: None,
     })?;

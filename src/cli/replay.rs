@@ -1,7 +1,7 @@
 //! `truebead replay`: does today's controller answer as the recorded one did?
 
 use std::io::IsTerminal;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, bail};
@@ -10,8 +10,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::WrongArguments;
 use super::cell::extruder;
-use crate::config::Cell;
-use crate::config::cell::{ExtruderPart, Purpose, RunPart};
+use super::recorded::attached;
+use crate::config::cell::{ExtruderPart, Purpose};
 use crate::control::Step;
 use crate::controller::{Controller, Setup};
 use crate::io::record::ExtruderFile;
@@ -66,8 +66,20 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<ExitCode> {
 
 /// The controller as it was at the start of the run.
 fn recorded_controller(recording: &Recording) -> anyhow::Result<Controller> {
-    let run = recorded_cell(recording)?;
-    let controller = Controller::new(Setup::from(&run));
+    let file = recording.file();
+    if recording.run().is_none() {
+        bail!(WrongArguments::new(format!(
+            "{file}: not a recording of truebead: it has no metadata record \"run\" at its start"
+        )));
+    }
+    let (cell, calibration) = attached(recording, Purpose::Run)
+        .context("the controller cannot be set up")
+        .map_err(WrongArguments::new)?;
+    let Some(run) = cell.run.clone() else {
+        let what = format!("cell.toml in {file}: it lacks tables that a run needs");
+        bail!(WrongArguments::new(what));
+    };
+    let controller = Controller::new(Setup::of(&cell, &run, &calibration));
     let Some(part) = &run.extruder else { return Ok(controller) };
     let file = recorded_file(recording, part)?;
     let cell = format!("cell.toml in {}", recording.file());
@@ -89,26 +101,6 @@ fn recorded_file(
     };
     let source = format!("{name} in {}", recording.file());
     Ok(Some(ExtruderFile { name, source, text: text.to_owned() }))
-}
-
-/// What a run needs, from the cell file that is attached.
-fn recorded_cell(recording: &Recording) -> anyhow::Result<RunPart> {
-    let file = recording.file();
-    if recording.run().is_none() {
-        bail!(WrongArguments::new(format!(
-            "{file}: not a recording of truebead: it has no metadata record \"run\" at its start"
-        )));
-    }
-    let Some(text) = recording.cell() else {
-        bail!(WrongArguments::new(format!(
-            "{file}: the attachment cell.toml is missing, so the controller cannot be set up"
-        )));
-    };
-    let name = format!("cell.toml in {file}");
-    let cell = Cell::parse(Path::new(&name), text, Purpose::Run).map_err(WrongArguments::new)?;
-    cell.run.ok_or_else(|| {
-        WrongArguments::new(format!("{name}: it lacks tables that a run needs")).into()
-    })
 }
 
 fn progress_bar() -> ProgressBar {

@@ -9,6 +9,7 @@ use clap::Args;
 use super::cell::{LoadedCell, beyond};
 use super::{Voice, WrongArguments, outcome};
 use crate::config::cell::{Purpose, RunPart};
+use crate::control::target::Target;
 use crate::io::clock::RunClock;
 use crate::io::record::{ExtruderFile, RecordConfig};
 use crate::io::stop::StopSignal;
@@ -72,7 +73,7 @@ pub fn drive(
         title,
         about: about(&loaded, &run, extruder.as_ref()),
         gauge: loaded.cell.gauge,
-        target: loaded.cell.target,
+        target: loaded.cell.target.as_ref().map(Target::nominal),
         max_rejected_share: loaded.cell.recording.max_rejected_share,
         control: Some(ControlFacts::of(&run, extruder.as_ref().map(|side| &side.setup.law))),
     })?;

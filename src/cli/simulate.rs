@@ -11,6 +11,7 @@ use clap::Args;
 use super::cell::LoadedCell;
 use super::{Voice, WITH_LOSS, outcome};
 use crate::config::cell::{KeepFrames, Purpose};
+use crate::control::target::Target;
 use crate::control::{Event, Step};
 use crate::io::record::{self, RecordConfig, RecorderHandle};
 use crate::io::stop::StopSignal;
@@ -72,7 +73,7 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
             ("calibration".into(), loaded.calibration_words()),
         ],
         gauge: loaded.cell.gauge,
-        target: loaded.cell.target,
+        target: loaded.cell.target.as_ref().map(Target::nominal),
         max_rejected_share: loaded.cell.recording.max_rejected_share,
         control: Some(ControlFacts::of(&run, law.as_ref())),
     })?;
@@ -188,15 +189,12 @@ impl Witness for Logger {
             frame: sight.seq,
             time_s: Some(sight.captured_at.secs()),
             outcome: sight.outcome,
-            control: Some(ControlColumns {
-                bead_path: sight.step.trace.bead_path_mm,
-                bead_expected: sight.step.trace.bead_expected,
-                nozzle_path: sight.step.trace.nozzle_path_mm,
-                speed: sight.speed,
-                setpoint: sight.setpoint,
-                state: sight.step.state.name(),
-                limit: sight.step.trace.limit,
-            }),
+            control: Some(ControlColumns::of(
+                sight.step,
+                sight.outcome.ok().map(|measured| measured.width),
+                sight.speed,
+                sight.setpoint,
+            )),
         };
         self.failed = self.log.frame(&row, sight.frame, sight.edges).err();
     }

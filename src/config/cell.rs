@@ -11,9 +11,10 @@ use std::path::Path;
 
 use super::control::{self, Control};
 use super::extruder::Beside;
-use super::rendered::{self, Simulation};
+use super::rendered::{self, Level, Simulation};
 use crate::calib::{Calibration, SurfaceMap};
 use crate::control::limiter::Limits;
+use crate::control::target::Target;
 use crate::document::Problems;
 use crate::document::{Document, Table};
 use crate::frame::Channel;
@@ -57,7 +58,7 @@ pub struct Cell {
     /// Upper end of the camera's scale where it is not that of the pixels.
     pub white: Option<u16>,
     /// Width that is asked for, if the file says so.
-    pub target: Option<Mm>,
+    pub target: Option<Target>,
     /// How often frames are wanted \[Hz\], if the file says so.
     pub frame_rate_hz: Option<f64>,
     /// How the camera rides, if the file says so.
@@ -119,9 +120,29 @@ impl Cell {
     /// The map of the measured surface, for a camera that rides as the cell says, at
     /// the robot's present z.
     pub fn surface(&self, calibration: &Calibration, robot_z: Option<Mm>) -> SurfaceMap {
+        let rise = self.rise(robot_z);
         let robot_z = robot_z.filter(|_| self.mount != Some(Mount::Fixed));
-        let map = calibration.surface(self.surface_height, robot_z);
+        let map = calibration.surface(self.surface_height + rise, robot_z);
         map.with_height_sigma(self.surface_height_sigma)
+    }
+}
+
+impl Cell {
+    /// How much higher than that of the first layer the surface is at a robot's
+    /// z, where the cell has layers: as much as the nozzle.
+    pub fn rise(&self, robot_z: Option<Mm>) -> Mm {
+        let layers = self.target.as_ref().and_then(Target::layers);
+        layers.zip(robot_z).map_or(Mm::ZERO, |(layers, z)| z - layers.first_z)
+    }
+
+    /// Length of bead that one width is the mean of.
+    pub fn gauge_length(&self, calibration: &Calibration) -> Mm {
+        let simulated = self.run.as_ref().is_some_and(|run| run.camera.source == Source::Rendered)
+            && self.simulation.level == Level::Widths;
+        if simulated {
+            return self.simulation.gauge_length;
+        }
+        self.gauge.length_on(&self.surface(calibration, None)).unwrap_or_default()
     }
 }
 
@@ -138,8 +159,11 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let bit_depth = gauge_table.as_ref().and_then(|t| t.optional_integer("bit_depth", 8..=16));
     let recording = read_recording(root.table("recording").as_ref());
     let control_table = root.run_table("control");
-    let target = control_table.as_ref().and_then(control::read_target);
-    let control = control_table.as_ref().and_then(|t| control::read_control(t, target));
+    let width = control_table.as_ref().and_then(control::read_target);
+    let layers = root.table("layers");
+    let target =
+        control_table.as_ref().and_then(|t| control::read_course(t, layers.as_ref(), width));
+    let control = control_table.as_ref().and_then(|t| control::read_control(t, target.clone()));
     let camera_table = root.run_table("camera");
     let mount = camera_table.as_ref().and_then(read_mount);
     let frame_rate_hz = camera_table.as_ref().and_then(|t| t.number("rate_hz", 0.01..=10_000.0));
@@ -148,7 +172,7 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let robot = root.run_table("robot").as_ref().and_then(|t| read_robot(t, limits));
     let simulation = rendered::read(root);
     let speed = robot.as_ref().map(|robot| robot.start_speed);
-    let bead = target.zip(speed);
+    let bead = width.zip(speed);
     let beside = Beside {
         bead,
         robot_address: robot.as_ref().map(|robot| robot.address.as_str()),

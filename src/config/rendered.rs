@@ -35,6 +35,10 @@ pub struct Simulation {
     pub frame_spacing: Option<Mm>,
     /// Step of the simulated world.
     pub step: Span,
+    /// Time between two reports of the robot.
+    pub report: Span,
+    /// Time from a picture to its width's arrival at the controller.
+    pub latency: Span,
     /// Bandwidth of the robot's speed loop \[Hz\].
     pub robot_bandwidth_hz: f64,
     /// Whether camera and robot link tick at phases drawn from the seed, as
@@ -44,6 +48,12 @@ pub struct Simulation {
     pub gauge_length: Mm,
     /// Standard deviation of a measured width, where no frame is rendered.
     pub width_noise: Mm,
+    /// Share of the widths that are outliers, where no frame is rendered.
+    pub outlier_share: f64,
+    /// Most by which these are off, as a share of the width.
+    pub outlier_size: f64,
+    /// Share of the frames that give no width, where none is rendered.
+    pub missing_share: f64,
     /// How wide a bead comes out at a speed.
     pub bead: BeadModel,
     /// How rough its edges are.
@@ -68,20 +78,30 @@ pub fn read(root: &Table<'_>) -> Option<Simulation> {
     let level = world.choice("level", &[("frames", Level::Frames), ("widths", Level::Widths)]);
     let path = world.number_or("path_mm", 1.0..=1e7, 2000.0);
     let step_ms = world.number_or("step_ms", 0.1..=1000.0, 20.0);
+    let report_ms = world.optional_number("report_ms", 1.0..=1000.0);
+    let latency_ms = world.number_or("latency_ms", 0.0..=1000.0, 0.0);
     let bandwidth = world.number_or("robot_bandwidth_hz", 0.01..=1000.0, 10.0);
     let random_phase = world.choice("phase", &[("random", true), ("aligned", false)]);
     let gauge_length = world.number_or("gauge_length_mm", 0.0..=1e4, 0.0);
     let noise = world.number_or("width_noise_mm", 0.0..=100.0, 0.36);
+    let outliers = world.number_or("outlier_share", 0.0..=1.0, 0.0);
+    let outlier_size = world.number_or("outlier_size", 0.0..=0.9, 0.2);
+    let missing = world.number_or("missing_share", 0.0..=1.0, 0.0);
     Some(Simulation {
         seed: seed?,
         level: level?,
         path: Mm::new(path?).ok()?,
         frame_spacing: spacing.and_then(|spacing| Mm::new(spacing).ok()),
         step: Span::from_secs(step_ms? / 1e3),
+        report: Span::from_secs(report_ms.unwrap_or(step_ms?) / 1e3),
+        latency: Span::from_secs(latency_ms? / 1e3),
         robot_bandwidth_hz: bandwidth?,
         random_phase: random_phase?,
         gauge_length: Mm::new(gauge_length?).ok()?,
         width_noise: Mm::new(noise?).ok()?,
+        outlier_share: outliers?,
+        outlier_size: outlier_size?,
+        missing_share: missing?,
         bead: model?,
         roughness: roughness?,
         flow: flow?,
@@ -116,11 +136,15 @@ fn read_flow(table: &Table<'_>) -> Option<Flow> {
     let step_ratio = table.number_or("flow_step_ratio", 0.05..=10.0, 1.0);
     let wave = table.number_or("flow_wave_share", 0.0..=0.9, 0.0);
     let wavelength = table.number_or("flow_wavelength_mm", 1.0..=1e6, 1000.0);
+    let pulse = table.number_or("flow_pulse_share", 0.0..=0.9, 0.0);
+    let period = table.number_or("flow_pulse_period_s", 0.01..=1e4, 2.0);
     Some(Flow {
         step_at_mm: step_at?,
         step_ratio: step_ratio?,
         wave_share: wave?,
         wavelength_mm: wavelength?,
+        pulse_share: pulse?,
+        pulse_period_s: period?,
     })
 }
 

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::distance::{DistanceTrace, Distrust};
 use crate::extruder::{ExtruderCommand, ExtruderFault, ExtruderState, ExtruderTrace};
 use crate::time::Stamp;
 use crate::units::{Mm, MmPerS};
@@ -136,6 +137,12 @@ pub struct Trace {
     /// Speed that the controller would like.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub demand_mm_per_s: Option<MmPerS>,
+    /// What the law by distance made of the width.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distance: Option<DistanceTrace>,
+    /// Why the width is held by the PI law instead of the one by distance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fallback: Option<Distrust>,
     /// The last limit that acted.
     pub limit: Limit,
 }

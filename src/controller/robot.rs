@@ -10,6 +10,7 @@ const RUN_UP: f64 = 0.95;
 
 impl Controller {
     pub(super) fn reported(&mut self, now: Stamp, state: &RobotState) {
+        let state = &self.odometer.correct(now, state);
         self.transport.observe(now, state);
         let before = self.robot.replace(*state);
         if self.ended {
@@ -53,7 +54,16 @@ impl Controller {
         if self.phase == Phase::Idle {
             self.bead_start = state.path_mm;
             self.phase = Phase::Priming;
+            self.fallback = None;
+            if let Some(law) = &mut self.distance {
+                law.begin_bead();
+            }
         }
+        let share = self.flow_share();
+        if let Some(law) = &mut self.distance {
+            law.reported(now, state.path_mm, state.speed_mm_per_s, share);
+        }
+        self.distrust();
         let told = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
         self.run_up |= state.speed_mm_per_s >= told * RUN_UP;
         if let Some((_, told)) = self.told {

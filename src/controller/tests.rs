@@ -5,6 +5,7 @@ mod extruder;
 use super::*;
 use crate::control::RobotLimits;
 use crate::control::pi::PiGains;
+use crate::control::target::Target;
 use crate::time::Span;
 use crate::units::MmPerS2;
 
@@ -12,8 +13,9 @@ use crate::units::MmPerS2;
 pub fn setup() -> Setup {
     Setup {
         control: Control {
-            target: Mm::constant(42.0),
-            gains: PiGains { kp_per_s: 5.925, ki_per_s2: 4.74 },
+            target: Target::constant(Mm::constant(42.0)),
+            law: WidthLaw::Pi,
+            gains: Some(PiGains { kp_per_s: 5.925, ki_per_s2: 4.74 }),
             max_gap: Span::from_secs(0.5),
             max_hold: Span::from_secs(3.0),
         },
@@ -26,6 +28,8 @@ pub fn setup() -> Setup {
         start_length: Mm::constant(200.0),
         camera_offset: Mm::constant(88.4),
         alone_for: Span::from_millis(1600),
+        setpoint_period: Span::from_millis(200),
+        distance: None,
     }
 }
 

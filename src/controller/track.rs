@@ -1,6 +1,6 @@
-//! Widths: where the bead in a frame was laid, and what the PI law makes of it.
+//! Widths: where the bead in a frame was laid, and what the laws make of it.
 
-use super::{Controller, Phase};
+use super::{Controller, Phase, Steering};
 use crate::control::follow::Verdict;
 use crate::control::pi::{Demand, Pi, Saturation};
 use crate::control::{Hold, Limit, Trace};
@@ -12,22 +12,59 @@ use crate::units::Mm;
 const LEAST_SHARE: f64 = 0.5;
 
 impl Controller {
-    pub(super) fn measured(&mut self, captured_at: Stamp, width: Mm, trace: &mut Trace) {
-        let error = width - self.setup.control.target;
-        trace.error_mm = Some(error);
+    pub(super) fn measured(
+        &mut self,
+        captured_at: Stamp,
+        (width, sigma): (Mm, Mm),
+        trace: &mut Trace,
+    ) {
         self.place(captured_at, trace);
+        let error = width - self.target_of(trace);
+        trace.error_mm = Some(error);
+        self.learn((width, sigma), trace);
         let primed = trace
             .nozzle_path_mm
             .is_some_and(|path| path - self.bead_start >= self.setup.start_length);
         let own_bead = trace.bead_expected;
+        let by_distance = self.distance.as_ref().is_some_and(|law| law.is_ready());
+        let by_distance = by_distance && self.fallback.is_none();
         match &self.phase {
-            Phase::Tracking { .. } => self.track(captured_at, error, trace),
+            Phase::Tracking { by: Steering::Pi { .. }, .. } => {
+                self.track(captured_at, error, trace);
+            }
+            Phase::Tracking { by: Steering::Distance, seen_at } if by_distance => {
+                let seen_at = captured_at.max(*seen_at);
+                self.phase = Phase::Tracking { by: Steering::Distance, seen_at };
+            }
+            Phase::Tracking { .. } => self.start_tracking(captured_at, error, trace),
             Phase::Priming | Phase::Holding { why: Hold::NoWidth, .. }
                 if primed && own_bead && !self.ended =>
             {
-                self.start_tracking(captured_at, error, trace);
+                if by_distance {
+                    self.phase = Phase::Tracking { by: Steering::Distance, seen_at: captured_at };
+                } else {
+                    self.start_tracking(captured_at, error, trace);
+                }
             }
             _ => {}
+        }
+    }
+
+    /// The width that was asked for where the bead in a frame was laid.
+    fn target_of(&self, trace: &Trace) -> Mm {
+        let z = self.robot.map_or(Mm::ZERO, |robot| robot.z_mm);
+        let path = trace.bead_path_mm.map_or(Mm::ZERO, |path| path - self.bead_start);
+        self.setup.control.target.at(z, path)
+    }
+
+    /// Lets the law by distance learn, whoever sets the speed.
+    fn learn(&mut self, (width, sigma): (Mm, Mm), trace: &mut Trace) {
+        if let (Some(law), Some(path)) = (&mut self.distance, trace.nozzle_path_mm)
+            && trace.bead_expected
+        {
+            let wanted = trace.error_mm.map_or(width, |error| width - error);
+            trace.distance = Some(law.measured(path, (width, sigma), wanted));
+            self.distrust();
         }
     }
 
@@ -46,17 +83,20 @@ impl Controller {
         // A robot that goes by the flow is slower or faster than the law says.
         let share = self.flow_share().max(LEAST_SHARE);
         let own = driven * (1.0 / share);
-        let mut pi = Pi::start_bumpless(self.setup.control.gains, own, error);
+        let mut pi = Pi::start_bumpless(self.setup.gains(), own, error);
         let demand = pi.step(error, Span::ZERO, Saturation::None);
         trace.note(&demand);
         self.told = self.told.map(|(at, _)| (at, driven));
-        self.phase = Phase::Tracking { pi, seen_at: captured_at, demand: demand.speed };
+        let by = Steering::Pi { pi, demand: demand.speed };
+        self.phase = Phase::Tracking { by, seen_at: captured_at };
     }
 
     fn track(&mut self, captured_at: Stamp, error: Mm, trace: &mut Trace) {
         let saturation = self.saturation();
         let max_gap = self.setup.control.max_gap;
-        let Phase::Tracking { pi, seen_at, demand } = &mut self.phase else { return };
+        let Phase::Tracking { by: Steering::Pi { pi, demand }, seen_at } = &mut self.phase else {
+            return;
+        };
         let dt = captured_at - *seen_at;
         if dt <= Span::ZERO {
             return;

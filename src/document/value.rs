@@ -99,6 +99,23 @@ impl<'a> Table<'a> {
         row
     }
 
+    /// One number or more in brackets, each within the range; they must be there.
+    pub fn list(&self, key: &'static str, range: RangeInclusive<f64>) -> Option<Vec<f64>> {
+        let expected = format!("one number or more in brackets, each {}", expected_number(&range));
+        let Some(value) = self.get(key) else {
+            self.absent(key, expected);
+            return None;
+        };
+        let numbers: Option<Vec<f64>> = value.get_ref().as_array().and_then(|array| {
+            array.iter().map(|v| as_number(v.get_ref()).filter(|n| range.contains(n))).collect()
+        });
+        let list = numbers.filter(|numbers| !numbers.is_empty());
+        if list.is_none() {
+            self.report(key, shown(value.get_ref()), expected);
+        }
+        list
+    }
+
     /// The same where the key may be absent.
     pub fn optional_numbers<const N: usize>(
         &self,

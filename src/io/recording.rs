@@ -104,7 +104,7 @@ pub enum Entry {
         /// When it was told.
         now: Stamp,
         /// What it answered.
-        step: Step,
+        step: Box<Step>,
     },
     /// A frame, still encoded as `foxglove.CompressedImage`.
     Frame(Message),
@@ -246,7 +246,11 @@ impl Recording {
             }
             STEP_TOPIC => {
                 let row: StepRow = serde_json::from_slice(&message.data).map_err(bad)?;
-                Some(Entry::Step { n: row.n, now: Stamp::from_ns(row.now_ns), step: row.step })
+                Some(Entry::Step {
+                    n: row.n,
+                    now: Stamp::from_ns(row.now_ns),
+                    step: Box::new(row.step),
+                })
             }
             IMAGE_TOPIC => Some(Entry::Frame(message)),
             _ => None,

@@ -1,14 +1,10 @@
 //! What a recording says of a bead: where the robot was, and the widths that were
 //! measured meanwhile.
 
-use crate::calib::SurfaceMap;
 use crate::control::offset::Width;
 use crate::control::{Event, RobotState};
-use crate::geometry::ImagePoint;
 use crate::io::recording::{Entry, RecordingError};
 use crate::time::Stamp;
-use crate::units::Mm;
-use crate::vision::{Axis, Gauge};
 
 /// A bead as it was recorded.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -42,46 +38,10 @@ pub fn print(
     Ok(print)
 }
 
-/// Length of a gauge along the bead on a surface; `None` where an end does not see it.
-pub fn gauge_length(gauge: &Gauge, map: &SurfaceMap) -> Option<Mm> {
-    let roi = gauge.roi;
-    #[expect(clippy::cast_precision_loss, reason = "pixel numbers stay far below 2^53")]
-    let [x, y, width, height] = [roi.x, roi.y, roi.width, roi.height].map(|px| px as f64);
-    let (across, along) = (x + 0.5 * (width - 1.0), y + 0.5 * (height - 1.0));
-    // From border to border of its pixels, the first of which has its centre at 0.
-    let ends = match gauge.axis {
-        Axis::Vertical => {
-            [ImagePoint::new(across, y - 0.5), ImagePoint::new(across, y + height - 0.5)]
-        }
-        Axis::Horizontal => {
-            [ImagePoint::new(x - 0.5, along), ImagePoint::new(x + width - 0.5, along)]
-        }
-    };
-    Mm::new((map.to_mm(ends[1])? - map.to_mm(ends[0])?).norm()).ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Roi;
-    use crate::vision::{Method, Polarity};
-
-    #[test]
-    fn a_gauge_is_as_long_as_its_rows_or_its_columns() {
-        let gauge = |axis| Gauge {
-            roi: Roi { x: 10, y: 20, width: 100, height: 50 },
-            axis,
-            polarity: Polarity::Bright,
-            width_range: (Mm::ZERO, Mm::constant(50.0)),
-            method: Method::Caliper,
-            calipers: 64,
-            min_contrast_grey: 6.0,
-        };
-        let map = SurfaceMap::from_scale(0.1);
-        let length = |axis| gauge_length(&gauge(axis), &map).unwrap().get();
-        assert!((length(Axis::Vertical) - 5.0).abs() < 1e-9);
-        assert!((length(Axis::Horizontal) - 10.0).abs() < 1e-9);
-    }
+    use crate::units::Mm;
 
     #[test]
     fn widths_are_put_in_the_order_of_their_frames() {

@@ -71,7 +71,8 @@ pub fn replay(
                 };
                 report.compared += 1;
                 if !same_bits(&recorded, &replayed) {
-                    report.difference = Some(Difference { n, now, event, recorded, replayed });
+                    report.difference =
+                        Some(Difference { n, now, event, recorded: *recorded, replayed });
                     return Ok(report);
                 }
             }
@@ -122,7 +123,7 @@ mod tests {
             };
             let step = controller(now, &event);
             entries.push(Entry::Event { n, now, event });
-            entries.push(Entry::Step { n, now, step });
+            entries.push(Entry::Step { n, now, step: Box::new(step) });
         }
         entries
     }

@@ -1,6 +1,6 @@
 //! What is known of one frame once it has been looked at.
 
-use crate::control::Limit;
+use crate::control::{Limit, Step};
 use crate::units::{Mm, MmPerS};
 use crate::vision::WidthMeasurement;
 
@@ -37,6 +37,31 @@ pub struct ControlColumns {
     pub state: &'static str,
     /// The limit that acted on the last setpoint.
     pub limit: Limit,
+    /// Width that was asked for where that bead was laid.
+    pub target: Option<Mm>,
+}
+
+impl ControlColumns {
+    /// From the answer to a frame, with the width that it showed, the speed
+    /// that the robot last reported and the last setpoint.
+    pub fn of(
+        step: &Step,
+        width: Option<Mm>,
+        speed: Option<MmPerS>,
+        setpoint: Option<MmPerS>,
+    ) -> Self {
+        let trace = &step.trace;
+        Self {
+            bead_path: trace.bead_path_mm,
+            bead_expected: trace.bead_expected,
+            nozzle_path: trace.nozzle_path_mm,
+            speed,
+            setpoint,
+            state: step.state.name(),
+            limit: trace.limit,
+            target: width.zip(trace.error_mm).map(|(width, error)| width - error),
+        }
+    }
 }
 
 /// Measurements for the tests of this folder.

@@ -156,7 +156,7 @@ impl SummaryBuilder {
             noise: Distribution::default(),
             first_s: None,
             last_s: None,
-            control: with_control.then(|| ControlTally::new(target)),
+            control: with_control.then(ControlTally::default),
             extruder: ExtruderTally::default(),
         }
     }

@@ -194,6 +194,7 @@ pub fn run(folder: &Path) -> Summary {
             setpoint: None,
             state: state_at(time).name(),
             limit: Limit::None,
+            target: Some(Mm::constant(42.0)),
         };
         let row = FrameRow { frame, time_s: Some(time), outcome, control: Some(control) };
         let shown = frame.is_multiple_of(50) || outcome.is_err();
@@ -248,6 +249,7 @@ pub fn hours(folder: &Path) -> Summary {
             setpoint: MmPerS::new(80.0).ok(),
             state: "tracking",
             limit: Limit::None,
+            target: Some(Mm::constant(42.0)),
         };
         let row = FrameRow { frame, time_s: Some(time), outcome, control: Some(control) };
         log.frame(&row, None, None).unwrap();

@@ -28,8 +28,15 @@ pub const COLUMNS: [&str; 16] = [
 ];
 
 /// Further columns of a run with a controller.
-pub const CONTROL_COLUMNS: [&str; 6] =
-    ["bead_path_mm", "nozzle_path_mm", "speed_mm_per_s", "setpoint_mm_per_s", "state", "limit"];
+pub const CONTROL_COLUMNS: [&str; 7] = [
+    "bead_path_mm",
+    "nozzle_path_mm",
+    "speed_mm_per_s",
+    "setpoint_mm_per_s",
+    "state",
+    "limit",
+    "target_mm",
+];
 
 /// Rows after which the file is flushed where no time tells sooner.
 const FLUSH_ROWS: u32 = 50;
@@ -145,7 +152,7 @@ fn measured_fields(measured: &WidthMeasurement) -> [String; 13] {
     .map(|value| decimals(Some(value), 6))
 }
 
-fn control_fields(control: Option<&ControlColumns>) -> [String; 6] {
+fn control_fields(control: Option<&ControlColumns>) -> [String; 7] {
     let Some(control) = control else { return Default::default() };
     [
         decimals(control.bead_path.map(f64::from), 6),
@@ -154,6 +161,7 @@ fn control_fields(control: Option<&ControlColumns>) -> [String; 6] {
         decimals(control.setpoint.map(f64::from), 6),
         control.state.to_string(),
         names::limit(control.limit).to_string(),
+        decimals(control.target.map(f64::from), 6),
     ]
 }
 

@@ -28,7 +28,9 @@ use super::render::RenderError;
 pub use camera::Sight;
 pub use witness::{Deaf, Witness};
 
-use camera::SimCamera;
+use std::collections::VecDeque;
+
+use camera::{SimCamera, Taken};
 use clock::{Ticker, What};
 use port::SimPort;
 
@@ -80,6 +82,10 @@ pub struct SimCell<K> {
     bead: LaidBead,
     now: Stamp,
     layers: u64,
+    /// Where in its period the pump's pulsation begins.
+    pulse_phase: f64,
+    /// Widths that have not arrived yet, the oldest first.
+    under_way: VecDeque<Arrival>,
     /// Nozzle's path at the start of the layer, and as far as bead is laid.
     bead_start: f64,
     laid_to: (f64, f64),
@@ -109,6 +115,22 @@ impl<K: Recorder> SimCell<K> {
         Self::with_extruder(cell, run, calibration, recorder, None)
     }
 
+    /// The same with a controller that is told the camera's distance wrong by a
+    /// factor.
+    pub fn told(
+        cell: &Cell,
+        run: &RunPart,
+        factor: f64,
+        calibration: Calibration,
+        recorder: K,
+    ) -> Result<Self, SimError> {
+        let mut told = run.clone();
+        told.camera.offset = told.camera.offset * factor;
+        let mut sim = Self::new(cell, &told, calibration, recorder)?;
+        sim.run = run.clone();
+        Ok(sim)
+    }
+
     /// The same with an extruder that is commanded.
     pub fn with_extruder(
         cell: &Cell,
@@ -129,7 +151,7 @@ impl<K: Recorder> SimCell<K> {
             ..RobotParams::default()
         };
         let port = SimPort::new(RobotCell::new(params, Stamp::START)?, run.robot.valid_ms);
-        let mut controller = Controller::new(Setup::from(run));
+        let mut controller = Controller::new(Setup::of(cell, run, &calibration));
         let nominal_flow = extruder.as_ref().map(|rig| rig.nominal_flow);
         let mut plant = None;
         if let Some(rig) = extruder {
@@ -145,6 +167,8 @@ impl<K: Recorder> SimCell<K> {
             bead: Self::fresh_bead(cell, 0),
             now: Stamp::START,
             layers: 0,
+            pulse_phase: hash::unit(hash::mix(&[simulation.seed, PULSE])),
+            under_way: VecDeque::new(),
             bead_start: 0.0,
             laid_to: (0.0, 0.0),
             started: false,
@@ -188,6 +212,7 @@ impl<K: Recorder> SimCell<K> {
         self.layers += 1;
         loop {
             let (at, what) = clock.next();
+            self.arrivals(at, witness);
             self.now = at;
             self.lay();
             match what {
@@ -241,6 +266,8 @@ impl<K: Recorder> SimCell<K> {
         let path = state.path_mm.get() - self.bead_start;
         let speed = self.speed_of_flow(state.speed_mm_per_s.get());
         let (from, last) = self.laid_to;
+        let pulse = self.cell.simulation.flow.pulse_at(self.now.secs(), self.pulse_phase);
+        self.bead.set_pulse(pulse);
         if path > from && matches!(state.mode, RobotMode::Print | RobotMode::Hold) {
             // A piece that is not laid is a gap.
             if let Some(speed) = speed {
@@ -273,30 +300,49 @@ impl<K: Recorder> SimCell<K> {
         (share > LEAST_FLOW).then(|| speed / share)
     }
 
+    /// Takes a picture, whose width arrives after the latency.
     fn look(&mut self, witness: &mut impl Witness) {
         let state = self.runner.robot_mut().state(self.now);
         let under = state.path_mm.get() - self.bead_start - self.run.camera.offset.get();
         let taken = self.camera.take(self.now, under, state.z_mm, &self.bead);
+        let latency = self.cell.simulation.latency;
+        let arrival = Arrival { at: self.now + latency, captured_at: self.now, under, taken };
+        self.under_way.push_back(arrival);
+        self.arrivals(self.now, witness);
+    }
+
+    /// Lets the widths arrive that are due by a moment.
+    fn arrivals(&mut self, until: Stamp, witness: &mut impl Witness) {
+        while self.under_way.front().is_some_and(|arrival| arrival.at <= until) {
+            let Some(arrival) = self.under_way.pop_front() else { return };
+            self.now = arrival.at;
+            self.arrive(arrival, witness);
+        }
+    }
+
+    fn arrive(&mut self, arrival: Arrival, witness: &mut impl Witness) {
+        let Arrival { captured_at, under, taken, .. } = arrival;
         let event = match &taken.outcome {
             Ok(measured) => Event::Measured {
                 frame: taken.seq,
-                captured_at: self.now,
+                captured_at,
                 width_mm: measured.width,
                 sigma_mm: measured.sigma,
             },
-            Err(status) => Event::Rejected {
-                frame: taken.seq,
-                captured_at: self.now,
-                reason: (*status).to_owned(),
-            },
+            Err(status) => {
+                Event::Rejected { frame: taken.seq, captured_at, reason: (*status).to_owned() }
+            }
         };
         let handled = self.tell(&event, witness);
+        // The edges are those of the last picture, which is this one unless
+        // another has been taken meanwhile.
+        let newest = self.under_way.is_empty();
         witness.look(&Sight {
             seq: taken.seq,
-            captured_at: self.now,
+            captured_at,
             outcome: taken.outcome,
             frame: taken.frame.as_ref(),
-            edges: taken.frame.is_some().then(|| self.camera.edges()),
+            edges: (newest && taken.frame.is_some()).then(|| self.camera.edges()),
             truth: taken.truth,
             under_mm: under,
             step: &handled.step,
@@ -305,3 +351,15 @@ impl<K: Recorder> SimCell<K> {
         });
     }
 }
+
+/// A width on its way to the controller.
+struct Arrival {
+    at: Stamp,
+    captured_at: Stamp,
+    /// Where along the bead the middle of the gauge was \[mm\].
+    under: f64,
+    taken: Taken,
+}
+
+/// Keeps the phase of the pulsation apart from other random numbers of a seed.
+const PULSE: u64 = 0x0070_756c_7365;

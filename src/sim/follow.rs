@@ -132,7 +132,7 @@ mod tests {
         Follower::new(Recipe {
             model: BeadModel::fitted_2022(),
             roughness: Roughness { size_mm: 0.0, length_mm: 5.0 },
-            flow: Flow { step_at_mm: 0.0, step_ratio: 1.0, wave_share: 0.0, wavelength_mm: 1e3 },
+            flow: Flow::STEADY,
             seed: 1,
         })
     }

@@ -21,6 +21,8 @@ pub struct LaidBead {
     model: BeadModel,
     flow: Flow,
     waviness: Waviness,
+    /// What the pump does over time.
+    pulse: f64,
     step_mm: f64,
     strips: Vec<Strip>,
 }
@@ -58,7 +60,7 @@ impl LaidBead {
             COARSEST_MM
         };
         let waviness = Waviness::new(roughness, seed);
-        Self { model, flow, waviness, step_mm, strips: Vec::new() }
+        Self { model, flow, waviness, pulse: 1.0, step_mm, strips: Vec::new() }
     }
 
     /// Lays a piece at one speed. Pieces come in the order of the path: what
@@ -76,7 +78,7 @@ impl LaidBead {
             self.strips.push(strip);
         }
         let last = number((to_mm / self.step_mm).ceil());
-        let width = self.model.width_at(speed_mm_per_s);
+        let width = self.model.width_at(speed_mm_per_s) * self.pulse;
         let Self { flow, waviness, step_mm, strips, .. } = self;
         let Some(strip) = strips.last_mut() else { return };
         strip.end_mm = to_mm;
@@ -87,6 +89,12 @@ impl LaidBead {
             let [left, right] = waviness.at(path_mm);
             strip.push(left - half, right + half, *step_mm);
         }
+    }
+
+    /// What the pump does over time to what is laid from now on, as a share of
+    /// the flow.
+    pub fn set_pulse(&mut self, ratio: f64) {
+        self.pulse = ratio;
     }
 
     /// Lays a piece over which the speed goes evenly from one to another.
@@ -184,8 +192,7 @@ impl Strip {
 mod tests {
     use super::*;
 
-    const STEADY: Flow =
-        Flow { step_at_mm: 0.0, step_ratio: 1.0, wave_share: 0.0, wavelength_mm: 1000.0 };
+    const STEADY: Flow = Flow::STEADY;
     const SMOOTH: Roughness = Roughness { size_mm: 0.0, length_mm: 5.0 };
     const ROUGH: Roughness = Roughness { size_mm: 0.1, length_mm: 5.0 };
 

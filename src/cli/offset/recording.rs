@@ -1,18 +1,17 @@
 //! From a bead that was recorded.
 
-use std::path::Path;
-
 use anyhow::Context;
 
 use super::super::WrongArguments;
 use super::super::cell::LoadedCell;
+use super::super::recorded::attached;
 use super::{OffsetArgs, tell};
-use crate::calib::{Calibration, file};
+use crate::calib::Calibration;
 use crate::config::Cell;
-use crate::config::cell::{CalibrationSource, Purpose};
+use crate::config::cell::Purpose;
 use crate::control::offset::{EXPONENTS, Found, Search, find};
 use crate::io::recording::Recording;
-use crate::offline::offset::{Print, gauge_length, print};
+use crate::offline::offset::{Print, print};
 use crate::units::Mm;
 use crate::vision::rank;
 
@@ -35,7 +34,7 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     };
     let (cell, calibration) = match cell {
         Some(loaded) => (loaded.cell, loaded.calibration),
-        None => attached(&recording)?,
+        None => attached(&recording, Purpose::Measure)?,
     };
     let name = args.input.display().to_string();
     let print = print(&mut recording).context("the recording cannot be read on")?;
@@ -50,30 +49,6 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The cell as it was in the run.
-fn attached(recording: &Recording) -> anyhow::Result<(Cell, Calibration)> {
-    let file = recording.file();
-    let Some(text) = recording.cell() else {
-        let what = format!("{file}: no cell file is attached to it; give one with --cell");
-        return Err(WrongArguments::new(what).into());
-    };
-    let name = format!("cell.toml in {file}");
-    let cell = Cell::parse(Path::new(&name), text, Purpose::Measure)?;
-    let calibration = match &cell.calibration {
-        CalibrationSource::Scale { mm_per_px, sigma } => {
-            Calibration::Scale { mm_per_px: *mm_per_px, sigma: *sigma }
-        }
-        CalibrationSource::File(_) => {
-            let text = recording.calibration().ok_or_else(|| {
-                let what = format!("{file}: its calibration is not attached; give a --cell");
-                WrongArguments::new(what)
-            })?;
-            file::parse(&format!("the calibration in {file}"), text)?
-        }
-    };
-    Ok((cell, calibration))
-}
-
 /// Length of the gauge on the surface of then.
 fn gauge(cell: &Cell, calibration: &Calibration, print: &Print) -> anyhow::Result<Mm> {
     // Afterwards the robot may lift the camera.
@@ -81,7 +56,7 @@ fn gauge(cell: &Cell, calibration: &Calibration, print: &Print) -> anyhow::Resul
     let mut heights: Vec<f64> = laying.map(|(_, state)| state.z_mm.get()).collect();
     let robot_z = rank::median(&mut heights).and_then(|z| Mm::new(z).ok());
     let map = cell.surface(calibration, robot_z);
-    gauge_length(&cell.gauge, &map).ok_or_else(|| {
+    cell.gauge.length_on(&map).ok_or_else(|| {
         let what = "gauge.roi_px does not see the surface, as the calibration has it";
         WrongArguments::new(what).into()
     })

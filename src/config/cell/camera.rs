@@ -61,9 +61,14 @@ pub struct Camera {
     pub mount: Mount,
     /// Path length from the nozzle back to the middle of the gauge.
     pub offset: Mm,
+    /// Standard deviation of that distance.
+    pub offset_sigma: Mm,
     /// Longest wait for a frame before the camera counts as lost.
     pub deadline: Span,
 }
+
+/// Standard deviation of an offset of which the file says none, as a share.
+const OFFSET_SIGMA: f64 = 0.1;
 
 pub(super) fn read_mount(table: &Table<'_>) -> Option<Mount> {
     table.required_choice("mount", &[("flange", Mount::Flange), ("fixed", Mount::Fixed)])
@@ -84,6 +89,7 @@ pub(super) fn read_camera(
         source
     });
     let offset = table.number("offset_mm", 0.0..=1e5);
+    let sigma = table.optional_number("offset_sigma_mm", 0.0..=1e4);
     let deadline = table.number_or("deadline_s", 0.05..=600.0, 2.0);
     Some(Camera {
         source: source?,
@@ -91,6 +97,7 @@ pub(super) fn read_camera(
         rate_hz: rate_hz?,
         mount: mount?,
         offset: Mm::new(offset?).ok()?,
+        offset_sigma: Mm::new(sigma.unwrap_or(OFFSET_SIGMA * offset?)).ok()?,
         deadline: Span::from_secs(deadline?),
     })
 }

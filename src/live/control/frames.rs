@@ -5,6 +5,7 @@ use super::Loop;
 use crate::control::{Event, Step};
 use crate::offline::{ControlColumns, FrameRow};
 use crate::time::Stamp;
+use crate::units::Mm;
 use crate::vision::Reject;
 
 impl Loop<'_> {
@@ -24,14 +25,14 @@ impl Loop<'_> {
             }
         };
         let step = self.give(event).step;
-        if step.trace.demand_mm_per_s.is_some() {
+        if step.trace.demand_mm_per_s.is_some() || step.trace.distance.is_some() {
             self.latencies.used(had_at, self.clock.now());
         }
         let row = FrameRow {
             frame: seq,
             time_s: Some(captured_at.secs()),
+            control: Some(self.columns(&step, outcome.as_ref().ok().map(|found| found.width))),
             outcome: outcome.map_err(|reject| reject.status()),
-            control: Some(self.columns(&step)),
         };
         self.scribe.frame(row, Some((frame, edges.0, edges.1)));
     }
@@ -42,20 +43,12 @@ impl Loop<'_> {
         let status = Reject::Unreadable.status();
         let event = Event::Rejected { frame: seq, captured_at: at, reason: status.to_owned() };
         let step = self.give(event).step;
-        let control = Some(self.columns(&step));
+        let control = Some(self.columns(&step, None));
         let row = FrameRow { frame: seq, time_s: Some(at.secs()), outcome: Err(status), control };
         self.scribe.frame(row, None);
     }
 
-    fn columns(&self, step: &Step) -> ControlColumns {
-        ControlColumns {
-            bead_path: step.trace.bead_path_mm,
-            bead_expected: step.trace.bead_expected,
-            nozzle_path: step.trace.nozzle_path_mm,
-            speed: self.speed,
-            setpoint: self.setpoint,
-            state: step.state.name(),
-            limit: step.trace.limit,
-        }
+    fn columns(&self, step: &Step, width: Option<Mm>) -> ControlColumns {
+        ControlColumns::of(step, width, self.speed, self.setpoint)
     }
 }

@@ -89,7 +89,7 @@ fn bead(begins_s: f64, lasts_s: f64) -> Vec<Entry> {
         let side = ExtruderStep { command: Some(command), ..ExtruderStep::default() };
         let is_tick = event == Event::ExtruderTick;
         let step = Step { extruder: is_tick.then_some(side), ..Step::default() };
-        [Entry::Event { n: 0, now, event }, Entry::Step { n: 0, now, step }]
+        [Entry::Event { n: 0, now, event }, Entry::Step { n: 0, now, step: Box::new(step) }]
     };
     told.into_iter().flat_map(entry).collect()
 }

@@ -41,6 +41,8 @@ pub struct Charts {
     pub width_low: Twice,
     /// Width plus two standard deviations.
     pub width_high: Twice,
+    /// Width that was asked for there.
+    pub target: Twice,
     /// Speed that the robot reports.
     pub speed: Twice,
     /// Setpoints.
@@ -86,6 +88,9 @@ impl Charts {
         self.width.push(x, path, width);
         self.width_low.push(x, path, width - 2.0 * sigma);
         self.width_high.push(x, path, width + 2.0 * sigma);
+        if let Some(target) = row.control.and_then(|control| control.target) {
+            self.target.push(x, path, target.get());
+        }
         self.contrast.push(x, measured.hints.contrast_grey);
         self.blur.push(x, measured.hints.blur_px);
         self.noise.push(x, measured.hints.noise_grey);

@@ -67,7 +67,9 @@ pub fn over_path(report: &Report<'_>) -> Markup {
 fn width_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) -> Markup {
     let charts = report.charts;
     let width = pick(&charts.width);
-    let target = report.summary.target_width_mm;
+    let course = pick(&charts.target);
+    let varies = course.range().is_some_and(|(low, high)| high - low > 1e-6);
+    let target = report.summary.target_width_mm.filter(|_| !varies);
     let values: Vec<f64> = target.into_iter().collect();
     let name = target.map(|target| format!("{target} mm")).unwrap_or_default();
     let mut layers = vec![
@@ -75,11 +77,14 @@ fn width_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) ->
         Layer::Curve(width, palette::WIDTH),
     ];
     layers.extend(target.map(|target| Layer::Level(target, palette::TARGET, name.as_str())));
+    if varies {
+        layers.push(Layer::Curve(course, palette::TARGET));
+    }
     let plot = Plot {
         area: Area::wide(270.0),
         x: axis,
         y_title: "width [mm]",
-        y_range: y_range(&[width], &values),
+        y_range: y_range(&[width, if varies { course } else { width }], &values),
         layers,
     };
     let mut entries = Vec::new();
@@ -87,8 +92,8 @@ fn width_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) ->
         entries.push(("width", palette::WIDTH, ""));
         entries.push(("± 2 standard deviations", palette::WIDTH, "area"));
     }
-    if target.is_some() {
-        entries.push(("target", palette::TARGET, "dash"));
+    if target.is_some() || varies {
+        entries.push(("target", palette::TARGET, if varies { "" } else { "dash" }));
     }
     if legend::has_marks(&charts.refused) && !axis.title.starts_with("distance") {
         entries.push(("refused frames, in the strip", palette::REJECTED, "block"));

@@ -8,6 +8,7 @@ use super::{Effort, ReproduceError, Reproduced, Rows, Section, Source, series};
 use crate::config::Cell;
 use crate::config::cell::{Purpose, RunPart};
 use crate::control::limiter::Limits;
+use crate::control::target::Target;
 use crate::offline::Progress;
 use crate::offline::report::area::{Area, XAxis};
 use crate::offline::report::palette;
@@ -102,7 +103,7 @@ impl Experiments {
 
     fn widths(&mut self, layer: &experiments::Layer) -> Result<Score, ReproduceError> {
         let target = layer.target_mm;
-        let found = experiments::lay(&self.cell, &self.run, target, self.seeds)?;
+        let found = experiments::lay(&self.cell, &asked(&self.run, target), self.seeds)?;
         let case = format!("{target} mm");
         self.tables(&case, layer, &found, None);
         if layer.target_mm == 42.0 {
@@ -116,7 +117,7 @@ impl Experiments {
         let mut quiet = self.cell.clone();
         quiet.simulation.width_noise = Mm::ZERO;
         for layer in &LAYERS {
-            let found = experiments::lay(&quiet, &self.run, layer.target_mm, self.seeds)?;
+            let found = experiments::lay(&quiet, &asked(&self.run, layer.target_mm), self.seeds)?;
             let case = format!("{} mm, without noise", layer.target_mm);
             let what = ("settles to 0.5 mm after", "mm");
             self.rows.push(case, what, [None, found.settled_mm, None]);
@@ -127,7 +128,7 @@ impl Experiments {
     fn frames(&mut self, layer: &experiments::Layer) -> Result<(), ReproduceError> {
         let lay = |method| {
             let cell = experiments::with_frames(&self.cell, method);
-            experiments::lay(&cell, &self.run, layer.target_mm, self.frame_seeds)
+            experiments::lay(&cell, &asked(&self.run, layer.target_mm), self.frame_seeds)
         };
         let (theirs, ours) = (lay(Method::EdgeLines)?, lay(Method::Caliper)?);
         let case = format!("{} mm, frames rendered", layer.target_mm);
@@ -166,6 +167,15 @@ impl Experiments {
         }
         Ok(())
     }
+}
+
+/// The same run with another width asked for.
+fn asked(run: &RunPart, target_mm: f64) -> RunPart {
+    let mut run = run.clone();
+    if let Ok(width) = Mm::new(target_mm) {
+        run.control.target = Target::constant(width);
+    }
+    run
 }
 
 fn draw_layer(limits: Limits, target: f64, score: &Score) -> Markup {

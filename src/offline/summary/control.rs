@@ -82,7 +82,6 @@ impl Quantiles {
 /// Adds up what control did.
 #[derive(Debug, Default)]
 pub struct ControlTally {
-    target: Option<Mm>,
     follower: Follower,
     began: Began,
     error: Moments,
@@ -113,15 +112,9 @@ enum Began {
 }
 
 impl ControlTally {
-    pub fn new(target: Option<Mm>) -> Self {
-        Self { target, ..Self::default() }
-    }
-
     pub fn frame(&mut self, row: &FrameRow) {
-        let (Ok(measured), Some(control), Some(target)) = (&row.outcome, row.control, self.target)
-        else {
-            return;
-        };
+        let (Ok(measured), Some(control)) = (&row.outcome, row.control) else { return };
+        let Some(target) = control.target else { return };
         let (Began::At(began) | Began::Over(began)) = self.began else { return };
         let Some(bead) = control.bead_path.filter(|bead| *bead >= began) else { return };
         // A robot that is not printing shows the camera the same bead again

@@ -44,6 +44,7 @@ fn row(width: f64, bead_path: f64, state: &'static str) -> FrameRow {
             setpoint: None,
             state,
             limit: Limit::None,
+            target: Some(Mm::constant(42.0)),
         }),
     }
 }

@@ -58,14 +58,16 @@ fn a_run_says_where_the_robot_was_and_what_the_controller_did() {
         setpoint: None,
         state: "tracking",
         limit: Limit::MinSpeed,
+        target: None,
     };
     let row =
         FrameRow { frame: 0, time_s: Some(0.0), outcome: Err("no_pair"), control: Some(control) };
     let lines = rows_of(true, &[row]);
     assert!(lines[0].ends_with(
-        ",used_share,bead_path_mm,nozzle_path_mm,speed_mm_per_s,setpoint_mm_per_s,state,limit"
+        ",used_share,bead_path_mm,nozzle_path_mm,speed_mm_per_s,setpoint_mm_per_s,state,limit,\
+         target_mm"
     ));
-    assert_eq!(lines[1], "0,0.000000000,no_pair,,,,,,,,,,,,,,,,,,,");
+    assert_eq!(lines[1], "0,0.000000000,no_pair,,,,,,,,,,,,,,,,,,,,");
 }
 
 #[test]

@@ -58,6 +58,9 @@ pub struct SimCamera {
     seq: u64,
     gauge_length: f64,
     noise: Mm,
+    /// Share of the widths that are outliers, and most by which they are off.
+    outliers: (f64, f64),
+    missing_share: f64,
     /// Widths that are believed.
     width_range: (Mm, Mm),
     rides: bool,
@@ -85,6 +88,8 @@ impl SimCamera {
             seq: 0,
             gauge_length: simulation.gauge_length.get(),
             noise: simulation.width_noise,
+            outliers: (simulation.outlier_share, simulation.outlier_size),
+            missing_share: simulation.missing_share,
             width_range: cell.gauge.width_range,
             rides: cell.mount != Some(Mount::Fixed),
             calibration,
@@ -150,7 +155,11 @@ impl SimCamera {
         let refused = Reject::NoPair { got: 0.0, need: 1.0 }.status();
         let truth = truth.ok_or(refused)?;
         let [noise, _] = hash::normal_pair(hash::mix(&[self.seed, NOISE, seq]));
-        let width = Mm::new(truth + noise * self.noise.get()).map_err(|_| refused)?;
+        if hash::unit(hash::mix(&[self.seed, MISSING, seq])) < self.missing_share {
+            return Err(refused);
+        }
+        let seen = (truth + noise * self.noise.get()) * self.outlier(seq);
+        let width = Mm::new(seen).map_err(|_| refused)?;
         let (min, max) = self.width_range;
         if !(min..=max).contains(&width) {
             let (got_mm, min_mm, max_mm) = (width.get(), min.get(), max.get());
@@ -168,6 +177,16 @@ impl SimCamera {
         })
     }
 
+    /// The factor by which a width is wrong; mostly 1.
+    fn outlier(&self, seq: u64) -> f64 {
+        let (share, size) = self.outliers;
+        if hash::unit(hash::mix(&[self.seed, OUTLIER, seq])) < share {
+            1.0 + size * (2.0 * hash::unit(hash::mix(&[self.seed, OUTLIER, seq, 1])) - 1.0)
+        } else {
+            1.0
+        }
+    }
+
     /// Where the edges of a bead in the middle of the gauge would be seen.
     fn edge_points(&self, width: Mm, surface: &SurfaceMap) -> Option<(ImagePoint, ImagePoint)> {
         let middle = surface.to_mm(self.middle)?;
@@ -177,5 +196,8 @@ impl SimCamera {
     }
 }
 
+/// Keep outliers and missing widths apart from other random numbers of a seed.
+const OUTLIER: u64 = 0x6f75_746c_6965_7200;
+const MISSING: u64 = 0x006d_6973_7369_6e67;
 /// Keeps the noise of widths apart from other random numbers of a seed.
 const NOISE: u64 = 0x006e_6f69_7365;

@@ -48,7 +48,7 @@ impl Ticker {
         };
         let clock = |period, phase, what| Clock { period, phase, count: 0, what };
         let mut clocks = vec![
-            clock(step, 0.0, What::Report),
+            clock(simulation.report.secs(), 0.0, What::Report),
             clock(frame, phase(1, frame), What::Frame),
             clock(tick, phase(2, tick), What::Tick),
         ];

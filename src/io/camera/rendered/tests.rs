@@ -16,10 +16,15 @@ const SMOOTH_STEADY: Simulation = Simulation {
     path: Mm::constant(2000.0),
     frame_spacing: None,
     step: Span::from_millis(20),
+    report: Span::from_millis(20),
+    latency: Span::ZERO,
     robot_bandwidth_hz: 10.0,
     random_phase: false,
     gauge_length: Mm::ZERO,
     width_noise: Mm::ZERO,
+    outlier_share: 0.0,
+    outlier_size: 0.0,
+    missing_share: 0.0,
     bead: BeadModel {
         width_mm: 10.0,
         at_speed_mm_per_s: 100.0,
@@ -28,7 +33,7 @@ const SMOOTH_STEADY: Simulation = Simulation {
         slow_exponent: 0.25,
     },
     roughness: Roughness { size_mm: 0.0, length_mm: 5.0 },
-    flow: Flow { step_at_mm: 0.0, step_ratio: 1.0, wave_share: 0.0, wavelength_mm: 1000.0 },
+    flow: Flow::STEADY,
     picture: Picture {
         size_px: [160, 120],
         blur_px: 1.0,
@@ -54,6 +59,7 @@ fn camera() -> (RenderedCamera, RobotView, Sender<()>) {
         rate_hz: 500.0,
         mount: Mount::Flange,
         offset: Mm::constant(90.0),
+        offset_sigma: Mm::constant(8.0),
         deadline: Span::from_millis(2000),
     };
     let scale = Calibration::Scale { mm_per_px: 0.1, sigma: None };

@@ -1,0 +1,168 @@
+//! The law on a bead whose truth is known.
+
+use super::*;
+use crate::sim::hash;
+
+/// A robot that does at once what it is told, and a bead of a power of its
+/// speed times a flow.
+struct Line {
+    law: ByDistance,
+    now_s: f64,
+    path: f64,
+    speed: f64,
+    /// Path and width, every 2 mm or so.
+    laid: Vec<(f64, f64)>,
+    frame: u64,
+}
+
+const TARGET: f64 = 42.0;
+const OFFSET: f64 = 88.4;
+const GAUGE: f64 = 12.7;
+const STEP_S: f64 = 0.02;
+
+fn settings() -> DistanceSettings {
+    DistanceSettings {
+        offset: Mm::constant(OFFSET),
+        offset_sigma: Mm::constant(0.1 * OFFSET),
+        gauge: Mm::constant(GAUGE),
+        reference_speed: MmPerS::constant(112.5),
+        exponent: 0.25,
+        learns_exponent: true,
+        drift_per_root_m: 0.0055,
+    }
+}
+
+impl Line {
+    fn new(settings: DistanceSettings) -> Self {
+        let law = ByDistance::new(settings);
+        Self { law, now_s: 0.0, path: 0.0, speed: 112.5, laid: Vec::new(), frame: 0 }
+    }
+
+    /// One frame's time: lay, report, see, and command from 200 mm on.
+    fn step(
+        &mut self,
+        exponent: f64,
+        flow: impl Fn(f64) -> f64,
+        noise: f64,
+    ) -> Option<DistanceTrace> {
+        let width = |at: f64| 38.61 * (self.speed / 112.5).powf(-exponent) * flow(at);
+        self.laid.push((self.path, width(self.path)));
+        self.path += self.speed * STEP_S;
+        self.now_s += STEP_S;
+        let (path, speed) = (Mm::new(self.path).unwrap(), MmPerS::new(self.speed).unwrap());
+        self.law.reported(Stamp::from_secs(self.now_s), path, speed, 1.0);
+        let seen = self.seen();
+        let trace = seen.map(|seen| {
+            self.frame += 1;
+            let [random, _] = hash::normal_pair(hash::mix(&[3, self.frame]));
+            let (width, sigma) = (Mm::new(seen + noise * random), Mm::new(noise));
+            self.law.measured(path, (width.unwrap(), sigma.unwrap()), Mm::constant(TARGET))
+        });
+        let (now, target) = (Stamp::from_secs(self.now_s), Mm::constant(TARGET));
+        if self.path >= 200.0
+            && let Some(speed) = self.law.speed(target, now, Span::from_secs(STEP_S))
+        {
+            self.speed = speed.get().clamp(60.0, 150.0);
+            self.law.steers(path);
+        }
+        trace
+    }
+
+    /// Mean width under the gauge.
+    fn seen(&self) -> Option<f64> {
+        let middle = self.path - OFFSET;
+        let within = |at: f64| (at - middle).abs() <= 0.5 * GAUGE;
+        if middle < GAUGE {
+            return None;
+        }
+        let widths: Vec<f64> =
+            self.laid.iter().filter(|(at, _)| within(*at)).map(|(_, w)| *w).collect();
+        let mut sum = 0.0;
+        for width in &widths {
+            sum += width;
+        }
+        (!widths.is_empty()).then(|| sum / f64::from(u32::try_from(widths.len()).unwrap()))
+    }
+
+    fn error(&self) -> f64 {
+        self.laid.last().unwrap().1 - TARGET
+    }
+}
+
+#[test]
+fn the_first_speed_is_right_to_the_exponent_and_what_is_left_goes_when_it_is_seen() {
+    let mut line = Line::new(settings());
+    while line.path < 230.0 {
+        let _ = line.step(0.22, |_| 1.0, 0.0);
+    }
+    assert!(line.error().abs() < 0.6, "{}", line.error());
+    while line.path < 380.0 {
+        let _ = line.step(0.22, |_| 1.0, 0.0);
+    }
+    assert!(line.error().abs() < 0.05, "{}", line.error());
+}
+
+#[test]
+fn a_step_of_the_flow_is_told_from_an_outlier_and_answered() {
+    let mut line = Line::new(settings());
+    let flow = |at: f64| if at > 900.0 { 1.08 } else { 1.0 };
+    let mut seen = Vec::new();
+    while line.path < 900.0 + OFFSET + 25.0 {
+        seen.extend(line.step(0.25, flow, 0.36).map(|trace| trace.use_of_width));
+    }
+    assert!(seen.contains(&Use::Change), "{seen:?}");
+    assert!(line.error().abs() < 0.6, "{}", line.error());
+}
+
+#[test]
+fn a_bead_that_does_not_answer_the_speed_contradicts_the_model() {
+    let mut line = Line::new(settings());
+    let flow = |at: f64| if at > 600.0 { 1.05 } else { 1.0 };
+    let mut found = None;
+    while line.path < 2500.0 {
+        let _ = line.step(0.0, flow, 0.36);
+        found = found.or(line.law.distrust());
+    }
+    assert_eq!(found, Some(Distrust::ModelContradicted));
+}
+
+#[test]
+fn a_model_that_holds_is_never_contradicted() {
+    for exponent in [0.2, 0.25, 0.35] {
+        let mut line = Line::new(settings());
+        let flow = |at: f64| if (700.0..1400.0).contains(&at) { 0.95 } else { 1.0 };
+        while line.path < 3000.0 {
+            let _ = line.step(exponent, flow, 0.36);
+            assert_eq!(line.law.distrust(), None, "at {} mm", line.path);
+        }
+    }
+}
+
+#[test]
+fn another_bead_begins_with_what_was_learnt() {
+    let mut line = Line::new(settings());
+    while line.path < 900.0 {
+        let _ = line.step(0.22, |_| 1.0, 0.36);
+    }
+    let mut next = Line::new(settings());
+    next.law = line.law.clone();
+    next.law.begin_bead();
+    let now = Stamp::from_secs(20.0);
+    let speed = next.law.speed(Mm::constant(TARGET), now, Span::from_secs(0.2)).unwrap();
+    let width = 38.61 * (speed.get() / 112.5).powf(-0.22);
+    assert!((width - TARGET).abs() < 0.3, "{width}");
+}
+
+#[test]
+fn nothing_seen_is_no_speed_and_a_width_without_a_path_is_no_reason() {
+    let mut law = ByDistance::new(settings());
+    let (now, span) = (Stamp::START, Span::from_secs(0.2));
+    assert_eq!(law.speed(Mm::constant(TARGET), now, span), None);
+    let trace = law.measured(
+        Mm::constant(100.0),
+        (Mm::constant(40.0), Mm::constant(0.3)),
+        Mm::constant(42.0),
+    );
+    assert_eq!(trace.use_of_width, Use::NotPaired);
+    assert!(!law.is_ready());
+}

@@ -1,0 +1,123 @@
+//! One layer on the fitted plant, and what became of the bead itself.
+
+use crate::calib::Calibration;
+use crate::config::cell::{Cell, RunPart};
+use crate::control::{Event, RobotState, Step};
+use crate::runner::NoRecorder;
+use crate::sim::cell::{Sight, SimCell, SimError, Witness};
+use crate::sim::score::{AlongBead, Score, mean};
+use crate::time::Stamp;
+use crate::units::Mm;
+
+use super::MM_PER_PX;
+
+/// Places along the bead at which it is judged \[mm\].
+const EVERY_MM: f64 = 0.5;
+
+/// A layer as it was laid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// What was measured.
+    pub score: Score,
+    /// Width of the bead itself, every half millimetre.
+    pub bead: Vec<AlongBead>,
+    /// Where the nozzle was when the first controlled setpoint was sent
+    /// \[mm\].
+    pub begun_mm: f64,
+    target_mm: f64,
+}
+
+impl Trial {
+    /// Lays one layer of the cell's nominal width with a seed.
+    pub fn lay(cell: &Cell, run: &RunPart, seed: u64) -> Result<Self, SimError> {
+        Self::lay_told(cell, run, 1.0, seed)
+    }
+
+    /// The same by a controller that is told the camera's distance wrong by a
+    /// factor.
+    pub fn lay_told(cell: &Cell, run: &RunPart, factor: f64, seed: u64) -> Result<Self, SimError> {
+        let mut cell = cell.clone();
+        cell.simulation.seed = seed + 1;
+        let target_mm = run.control.target.nominal().get();
+        let scale = Calibration::Scale { mm_per_px: MM_PER_PX, sigma: None };
+        let mut sim = SimCell::told(&cell, run, factor, scale, NoRecorder)?;
+        let mut watch = Watch { score: Score::new(target_mm), newest: None, begun: None };
+        let _ = sim.layer(Mm::ZERO, &mut watch);
+        let mut bead = Vec::new();
+        let mut at = 0.0;
+        while at < cell.simulation.path.get() {
+            bead.extend(sim.bead().width_at(at).map(|width| (at, width)));
+            at += EVERY_MM;
+        }
+        let begun_mm = watch.begun.unwrap_or(f64::INFINITY);
+        Ok(Self { score: watch.score, bead, begun_mm, target_mm })
+    }
+
+    /// Way from a place to where the bead stays within a band of the target for
+    /// good \[mm\]; infinite if it never does.
+    pub fn settles_within(&self, from_mm: f64, band_mm: f64) -> f64 {
+        let outside =
+            |(at, width): &AlongBead| *at >= from_mm && (width - self.target_mm).abs() > band_mm;
+        match self.bead.iter().rposition(outside) {
+            None => 0.0,
+            Some(last) => self.bead.get(last + 1).map_or(f64::INFINITY, |(at, _)| at - from_mm),
+        }
+    }
+
+    /// Integral of the error's size over the path from a place on \[mm²\].
+    pub fn error_integral(&self, from_mm: f64) -> f64 {
+        self.errors(from_mm).map(|error| error.abs() * EVERY_MM).sum()
+    }
+
+    /// Mean size of the bead's error from a place on \[mm\].
+    pub fn mean_error(&self, from_mm: f64) -> f64 {
+        mean(self.errors(from_mm).map(f64::abs))
+    }
+
+    /// Root mean square of the bead's error from a place on \[mm\].
+    pub fn rms_error(&self, from_mm: f64) -> f64 {
+        mean(self.errors(from_mm).map(|error| error * error)).sqrt()
+    }
+
+    /// Standard deviation of the bead's width from a place on \[mm\].
+    pub fn scatter(&self, from_mm: f64) -> f64 {
+        let middle = mean(self.errors(from_mm));
+        mean(self.errors(from_mm).map(|error| (error - middle).powi(2))).sqrt()
+    }
+
+    fn errors(&self, from_mm: f64) -> impl Iterator<Item = f64> {
+        let late = self.bead.iter().filter(move |(at, _)| *at >= from_mm);
+        late.map(|(_, width)| width - self.target_mm)
+    }
+}
+
+/// Watches for the first setpoint that is a controller's.
+struct Watch {
+    score: Score,
+    /// Path at the bead's start, the newest report, and when it came.
+    newest: Option<(f64, RobotState, Stamp)>,
+    begun: Option<f64>,
+}
+
+impl Witness for Watch {
+    fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
+        self.score.step(now, event, step);
+        match event {
+            Event::Robot(state) if state.mode.lays_bead() => {
+                let start = self.newest.map_or(state.path_mm.get(), |(start, ..)| start);
+                self.newest = Some((start, *state, now));
+            }
+            Event::Tick if step.state.name() == "tracking" && step.command.is_some() => {
+                let path = self.newest.map(|(start, state, at)| {
+                    (state.path_mm + state.speed_mm_per_s * (now - at)).get() - start
+                });
+                self.begun = self.begun.or(path);
+            }
+            _ => {}
+        }
+    }
+
+    fn look(&mut self, sight: &Sight<'_>) {
+        self.score.look(sight);
+    }
+}
