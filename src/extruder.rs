@@ -20,6 +20,7 @@ pub mod readings;
 pub mod report;
 pub mod rheology;
 pub mod screw;
+pub mod start_stop;
 pub mod state;
 pub mod supervisor;
 

@@ -19,4 +19,5 @@ pub mod quantity;
 pub mod residual;
 pub mod savgol;
 pub mod series;
+pub mod start_stop;
 pub mod table;

@@ -33,6 +33,7 @@ pub mod link;
 pub mod live;
 pub mod model;
 pub mod offline;
+pub mod plan;
 pub mod ports;
 pub mod runner;
 pub mod sim;

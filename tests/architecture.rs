@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 const LAYERS: [&[&str]; 10] = [
     &["units", "time"],
     &["frame", "geometry", "model", "document"],
-    &["bridge", "calib", "vision", "control", "extruder", "identify", "link"],
+    &["bridge", "calib", "vision", "control", "extruder", "identify", "link", "plan"],
     &["config"],
     &["controller"],
     &["ports", "runner"],

@@ -1,0 +1,102 @@
+//! Starts and stops of a bead: when the pump must run so that the flow comes as
+//! the robot leaves, and where it must stop so that what still comes fills the
+//! rest of the bead.
+//!
+//! While an extruder stands, melt recedes from its nozzle, and a start fills the
+//! void before anything flows: the first flow comes late by a delay that grows
+//! with the idle time. After a stop melt that is still under pressure drools
+//! out. bcs-thesis, sections 1.3.3 and 1.3.4: dwell times that are fixed leave
+//! "bulging if the residence time is low, or a void if the residence time
+//! is high".
+//!
+//! ```text
+//! start  q(t) = Q·(1 − e^(−(t − d)/T)),  d = L + V(idle)/Q,  V(idle) = V∞·(1 − e^(−idle/τ))
+//! stop   q(t) = Q·f(t),  f(t) = (1 − a)·e^(−(t − L')/T') + a·e^(−(t − L')/τd),  a = D/τd
+//! ```
+//!
+//! A robot that keeps its speed leaves the least void and surplus together where
+//! it starts and ends at half the flow. One that may slow down to a share m of
+//! its speed follows the flow between m and 1, and starts and ends at m/2; m = 1
+//! is the robot that keeps its speed.
+
+mod begin;
+mod end;
+mod parameters;
+
+pub use begin::{Pause, Start};
+pub use end::Stop;
+pub use parameters::{StartStop, StartStopError};
+
+use crate::time::Span;
+use crate::units::{Mm3PerS, MmPerS};
+
+/// What is laid between a start and a stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Laid {
+    /// Flow that the bead needs at the robot's start speed.
+    pub flow: Mm3PerS,
+    /// The robot's start speed.
+    pub speed: MmPerS,
+    /// Share of that speed, above 0 to 1, down to which the robot may follow the
+    /// flow; 1 for a robot that keeps its speed.
+    pub least_share: f64,
+    /// How late the robot follows a speed that it is told; it is told so much
+    /// earlier.
+    pub robot_lag: Span,
+}
+
+/// Starts and stops of one kind of bead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Timing {
+    parameters: StartStop,
+    laid: Laid,
+}
+
+impl Timing {
+    /// Fails where a parameter, the flow, the speed or the share cannot be.
+    pub fn new(parameters: StartStop, laid: Laid) -> Result<Self, StartStopError> {
+        parameters.check()?;
+        for (what, value) in [
+            ("the flow of a bead [mm³/s]", laid.flow.get()),
+            ("the robot's start speed [mm/s]", laid.speed.get()),
+        ] {
+            if value <= 0.0 {
+                return Err(StartStopError::NotPositive { what, value });
+            }
+        }
+        if !(laid.least_share > 0.0 && laid.least_share <= 1.0) {
+            return Err(StartStopError::Share { value: laid.least_share });
+        }
+        let robot_lag_s = laid.robot_lag.secs();
+        if robot_lag_s < 0.0 {
+            return Err(StartStopError::Negative {
+                what: "the robot's lag [s]",
+                value: robot_lag_s,
+            });
+        }
+        Ok(Self { parameters, laid })
+    }
+
+    /// What the extruder is like.
+    pub const fn parameters(&self) -> &StartStop {
+        &self.parameters
+    }
+
+    /// What is laid.
+    pub const fn laid(&self) -> &Laid {
+        &self.laid
+    }
+
+    /// The start after a pause of the pump.
+    pub fn start(&self, pause: &Pause) -> Start {
+        Start::after(&self.parameters, &self.laid, pause)
+    }
+
+    /// The stop of a bead that flows evenly.
+    pub fn stop(&self) -> Stop {
+        Stop::of(&self.parameters, &self.laid)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,162 @@
+//! What an extruder's starts and stops are like.
+
+/// Why there is no such extruder, or no such bead.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum StartStopError {
+    /// A number that must be finite and above zero.
+    #[error("{what} is {value}; it must be a finite number above zero")]
+    NotPositive {
+        /// Which number, with its unit.
+        what: &'static str,
+        /// What was found.
+        value: f64,
+    },
+    /// A number that must be finite and must not be negative.
+    #[error("{what} is {value}; it must be finite and zero or more")]
+    Negative {
+        /// Which number, with its unit.
+        what: &'static str,
+        /// What was found.
+        value: f64,
+    },
+    /// More in the slow part of the flow than there is flow.
+    #[error(
+        "a drool of {drool_s} s of flow within a time constant of {time_constant_s} s would begin \
+         with more than the flow before the stop; the time constant must be the longer one"
+    )]
+    TooMuchDrool {
+        /// Volume of the drool over the flow before \[s\].
+        drool_s: f64,
+        /// Time constant of the drool \[s\].
+        time_constant_s: f64,
+    },
+    /// A share of the start speed that is none.
+    #[error("the least share of the start speed is {value}; it must be above 0 and at most 1")]
+    Share {
+        /// What was found.
+        value: f64,
+    },
+}
+
+/// Parameters of starts and stops, which `identify` finds from recordings. They
+/// hold for a material, a nozzle and a temperature (bcs-thesis, section 5.2).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StartStop {
+    /// L: from the command to the first flow of an extruder that has not stood
+    /// \[s\].
+    pub first_flow_s: f64,
+    /// T: time constant with which the flow comes \[s\].
+    pub rise_s: f64,
+    /// V∞: what must be filled before anything flows after a long pause \[mm³\].
+    pub void_mm3: f64,
+    /// τ: time constant with which that void opens \[s\].
+    pub idle_time_constant_s: f64,
+    /// L': from the command to stop until the flow falls \[s\].
+    pub stop_s: f64,
+    /// T': time constant with which most of the flow falls \[s\].
+    pub fall_s: f64,
+    /// D: what drools out slowly after that, for each unit of the flow before:
+    /// D·Q mm³ after Q mm³/s \[s\].
+    pub drool_s: f64,
+    /// τd: time constant of the drool \[s\].
+    pub drool_time_constant_s: f64,
+}
+
+impl StartStop {
+    /// Fails where a time or a volume cannot be.
+    pub fn check(&self) -> Result<(), StartStopError> {
+        let positive = [
+            ("the time constant of the rise [s]", self.rise_s),
+            ("the time constant of the void [s]", self.idle_time_constant_s),
+            ("the time constant of the fall [s]", self.fall_s),
+            ("the time constant of the drool [s]", self.drool_time_constant_s),
+        ];
+        let not_negative = [
+            ("the delay of the first flow [s]", self.first_flow_s),
+            ("the void [mm³]", self.void_mm3),
+            ("the delay of the stop [s]", self.stop_s),
+            ("the drool [s]", self.drool_s),
+        ];
+        if let Some((what, value)) = positive.into_iter().find(|(_, v)| !positive_number(*v)) {
+            return Err(StartStopError::NotPositive { what, value });
+        }
+        let negative = |v: f64| !(v.is_finite() && v >= 0.0);
+        if let Some((what, value)) = not_negative.into_iter().find(|(_, v)| negative(*v)) {
+            return Err(StartStopError::Negative { what, value });
+        }
+        if self.drool_s > self.drool_time_constant_s {
+            return Err(StartStopError::TooMuchDrool {
+                drool_s: self.drool_s,
+                time_constant_s: self.drool_time_constant_s,
+            });
+        }
+        Ok(())
+    }
+
+    /// V(idle): what is empty after the pump has stood so long \[mm³\].
+    pub fn void_after(&self, idle_s: f64) -> f64 {
+        -self.void_mm3 * libm::expm1(-idle_s.max(0.0) / self.idle_time_constant_s)
+    }
+
+    /// d: from the command to the first flow after the pump has stood so long,
+    /// for a command that gives so much flow \[s\].
+    pub fn delay_s(&self, idle_s: f64, flow_mm3_per_s: f64) -> f64 {
+        self.first_flow_s + self.void_after(idle_s) / flow_mm3_per_s
+    }
+
+    /// f: the flow so long after the command to stop, as a share of the flow
+    /// before.
+    pub fn falling(&self, since_s: f64) -> f64 {
+        let since_s = since_s - self.stop_s;
+        if since_s <= 0.0 {
+            return 1.0;
+        }
+        let slow = self.slow_share();
+        (1.0 - slow) * libm::exp(-since_s / self.fall_s)
+            + slow * libm::exp(-since_s / self.drool_time_constant_s)
+    }
+
+    /// ∫f: what has come so long after the command to stop, for each unit of the
+    /// flow before \[s\].
+    pub fn fallen_s(&self, since_s: f64) -> f64 {
+        let past_s = since_s - self.stop_s;
+        if past_s <= 0.0 {
+            return since_s;
+        }
+        let slow = self.slow_share();
+        let [fast_s, drool_s] = [self.fall_s, self.drool_time_constant_s];
+        self.stop_s
+            - (1.0 - slow) * fast_s * libm::expm1(-past_s / fast_s)
+            - slow * drool_s * libm::expm1(-past_s / drool_s)
+    }
+
+    /// The same after all has come \[s\].
+    pub fn after_stop_s(&self) -> f64 {
+        self.stop_s + (1.0 - self.slow_share()) * self.fall_s + self.drool_s
+    }
+
+    /// When the flow has fallen to a share, from the command to stop \[s\].
+    pub fn falls_to_s(&self, share: f64) -> f64 {
+        let share = share.clamp(f64::MIN_POSITIVE, 1.0);
+        // Slower than either part alone it cannot be.
+        let slowest_s = self.fall_s.max(self.drool_time_constant_s);
+        let (mut low, mut high) = (self.stop_s, self.stop_s - slowest_s * libm::log(share));
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if self.falling(middle) > share { low = middle } else { high = middle }
+        }
+        high
+    }
+
+    /// a: the share of the flow that falls slowly.
+    fn slow_share(&self) -> f64 {
+        self.drool_s / self.drool_time_constant_s
+    }
+}
+
+/// Halvings after which nothing of a second is left.
+const BISECTIONS: u32 = 60;
+
+fn positive_number(value: f64) -> bool {
+    value.is_finite() && value > 0.0
+}

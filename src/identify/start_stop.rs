@@ -1,0 +1,106 @@
+//! Starts and stops from a recording: how late the first flow comes after a
+//! pause, and what still comes after a stop.
+//!
+//! ```text
+//! command ─▶ episodes: runs and the pauses between them
+//! flow after every stop, over that before  ─▶ fall:  L', T', D, τd      (all stops together)
+//! flow after every start, over that later  ─▶ rise:  d of each start, T
+//! d over the pauses                        ─▶ void:  L, V∞, τ
+//! ```
+//!
+//! The command is in any unit: what counts is when it runs, and the flow that
+//! comes of it. Standard errors are those that the starts and the stops show
+//! among themselves.
+
+mod episodes;
+mod error;
+mod fall;
+mod least;
+mod rise;
+mod void;
+
+pub use error::StartStopFitError;
+
+use crate::extruder::start_stop::StartStop;
+use crate::identify::series::Series;
+
+/// A start as it was seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeenStart {
+    /// When the command began \[s\].
+    pub at_s: f64,
+    /// How long the pump had stood \[s\].
+    pub idle_s: f64,
+    /// Flow that it came to \[mm³/s\].
+    pub flow_mm3_per_s: f64,
+    /// From the command to the first flow \[s\].
+    pub delay_s: f64,
+    /// What the fitted model says of it \[s\].
+    pub modelled_s: f64,
+}
+
+/// A stop as it was seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeenStop {
+    /// When the command ended \[s\].
+    pub at_s: f64,
+    /// Flow before it \[mm³/s\].
+    pub flow_mm3_per_s: f64,
+    /// How long the flow was looked at after it \[s\].
+    pub seen_s: f64,
+    /// What came in that time, with what was on its way \[mm³\].
+    pub came_mm3: f64,
+}
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StartStopFit {
+    /// The parameters.
+    pub parameters: StartStop,
+    /// Their standard errors, each in its own unit.
+    pub sigma: StartStop,
+    /// Starts after a pause that is known.
+    pub starts: Vec<SeenStart>,
+    /// Stops.
+    pub stops: Vec<SeenStop>,
+    /// Standard deviation of the delays about the model \[s\].
+    pub delay_scatter_s: f64,
+}
+
+/// Parameters of starts and stops from a command, in any unit, and a flow
+/// \[mm³/s\]. Fails where the recording does not tell them.
+pub fn fit(command: &Series, flow: &Series) -> Result<StartStopFit, StartStopFitError> {
+    let episodes = episodes::find(command, flow)?;
+    let fall = fall::fit(&episodes.stops)?;
+    let rise = rise::fit(&episodes.starts, &fall.model)?;
+    let void = void::fit(&rise.starts)?;
+    let parameters = assemble(&fall.model, rise.time_constant_s, &void.value);
+    let sigma = assemble(&fall.sigma, rise.sigma_s, &void.sigma);
+    let starts = rise.starts.iter().map(|start| SeenStart {
+        modelled_s: parameters.delay_s(start.idle_s, start.flow_mm3_per_s),
+        ..*start
+    });
+    Ok(StartStopFit {
+        parameters,
+        sigma,
+        starts: starts.collect(),
+        stops: fall.stops,
+        delay_scatter_s: void.scatter_s,
+    })
+}
+
+fn assemble(fall: &fall::Falling, rise_s: f64, void: &void::Saturating) -> StartStop {
+    StartStop {
+        first_flow_s: void.first_flow_s,
+        rise_s,
+        void_mm3: void.void_mm3,
+        idle_time_constant_s: void.idle_time_constant_s,
+        stop_s: fall.stop_s,
+        fall_s: fall.fall_s,
+        drool_s: fall.drool_s,
+        drool_time_constant_s: fall.drool_time_constant_s,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,220 @@
+//! Starts and stops in a recording: when the command says so, and the flow
+//! about each.
+
+use super::StartStopFitError;
+use crate::identify::grid::usual_step;
+use crate::identify::series::Series;
+use crate::vision::rank;
+
+/// A command above this share of its largest value runs the pump.
+const RUNS_SHARE: f64 = 0.05;
+/// A start is looked at until then at the latest \[s\].
+const LONGEST_START_S: f64 = 30.0;
+/// A stop is looked at for so long \[s\].
+const LONGEST_STOP_S: f64 = 6.0;
+/// A stop that was looked at for less tells nothing of the drool \[s\].
+const SHORTEST_STOP_S: f64 = 0.5;
+/// Less than this share of the samples tells neither.
+const SEEN_SHARE: f64 = 0.8;
+/// A run tells its flow in this share at its end.
+const EVEN_SHARE: f64 = 0.4;
+/// A flow, or a command, that changes by more than this share is not even.
+const UNEVEN_SHARE: f64 = 0.05;
+/// Three standard deviations of the difference of the medians of two halves, over
+/// the median step from a sample to the next and √n: 3·1.2533·2/(0.6745·√2).
+const NOISE_FACTOR: f64 = 7.88;
+/// A run whose flow is below this share of the largest has none…
+const NO_FLOW_SHARE: f64 = 0.1;
+/// …unless it is shorter than this share of the usual one.
+const SHORT_SHARE: f64 = 0.5;
+const FEWEST_SAMPLES: usize = 50;
+/// Fewer samples of an even flow do not tell it.
+const FEWEST_EVEN: usize = 10;
+
+/// Flow after a change of the command.
+#[derive(Debug, Clone)]
+pub(super) struct Episode {
+    /// When the command changed \[s\].
+    pub at_s: f64,
+    /// For a start: how long the pump had stood. For a stop: how long it then
+    /// stood, as far as that was seen \[s\].
+    pub idle_s: f64,
+    /// Even flow of the run that begins or ends \[mm³/s\].
+    pub flow: f64,
+    /// Even flow of the run before the pause \[mm³/s\].
+    pub before: f64,
+    /// Time since the change \[s\] and flow over the even one.
+    pub samples: Vec<(f64, f64)>,
+    /// From one sample to the next \[s\].
+    pub step_s: f64,
+}
+
+/// What a recording holds.
+#[derive(Debug, Clone)]
+pub(super) struct Episodes {
+    pub starts: Vec<Episode>,
+    pub stops: Vec<Episode>,
+}
+
+/// A time in which the pump is told to run, and its even flow.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    from_s: f64,
+    to_s: f64,
+    /// Whether it was told to stop at its end; otherwise the record ends.
+    is_told_to_stop: bool,
+    flow: f64,
+    /// Whether the command was the same all along and the flow even at its end.
+    is_even: bool,
+}
+
+/// Finds starts after a pause that is known, and stops of an even flow.
+pub(super) fn find(command: &Series, flow: &Series) -> Result<Episodes, StartStopFitError> {
+    for (what, series, needed) in [("the command", command, 2), ("the flow", flow, FEWEST_SAMPLES)]
+    {
+        if series.len() < needed {
+            return Err(StartStopFitError::TooFewSamples { what, found: series.len(), needed });
+        }
+    }
+    let mut runs = runs(command, flow)?;
+    let most = runs.iter().map(|run| run.flow).fold(0.0, f64::max);
+    check_flow(&runs, most)?;
+    for run in &mut runs {
+        run.is_even &= run.flow > NO_FLOW_SHARE * most;
+    }
+    let starts: Vec<Episode> = runs
+        .windows(2)
+        .filter_map(|pair| if let [last, run] = pair { start(flow, last, run) } else { None })
+        .collect();
+    let ends_s = flow.time_s.last().copied().unwrap_or(0.0);
+    let nexts = runs.iter().skip(1).map(|next| next.from_s).chain([ends_s]);
+    let stops: Vec<Episode> =
+        runs.iter().zip(nexts).filter_map(|(run, next_s)| stop(flow, run, next_s)).collect();
+    check_count(&starts, &stops, &runs)?;
+    Ok(Episodes { starts, stops })
+}
+
+fn start(flow: &Series, last: &Run, run: &Run) -> Option<Episode> {
+    let to_s = run.to_s.min(run.from_s + LONGEST_START_S);
+    let (idle_s, before) = (run.from_s - last.to_s, last.flow);
+    run.is_even.then(|| episode(flow, [run.from_s, to_s], idle_s, [run.flow, before]))?
+}
+
+fn stop(flow: &Series, run: &Run, next_s: f64) -> Option<Episode> {
+    let idle_s = next_s - run.to_s;
+    let to_s = run.to_s + idle_s.min(LONGEST_STOP_S);
+    let told = run.is_told_to_stop && run.is_even && idle_s >= SHORTEST_STOP_S;
+    told.then(|| episode(flow, [run.to_s, to_s], idle_s, [run.flow, run.flow]))?
+}
+
+/// The flow between two moments; none where much of it was lost.
+fn episode(
+    flow: &Series,
+    [from_s, to_s]: [f64; 2],
+    idle_s: f64,
+    [even, before]: [f64; 2],
+) -> Option<Episode> {
+    let step_s = usual_step(&flow.time_s)?;
+    let part = flow.within(from_s, to_s);
+    let pairs = part.time_s.iter().zip(&part.values);
+    let samples: Vec<(f64, f64)> = pairs.map(|(t, q)| (t - from_s, q / even)).collect();
+    #[expect(clippy::cast_precision_loss, reason = "some thousand samples")]
+    let seen_s = samples.len() as f64 * step_s;
+    let is_whole = seen_s >= SEEN_SHARE * (to_s - from_s);
+    is_whole.then_some(Episode { at_s: from_s, idle_s, flow: even, before, samples, step_s })
+}
+
+fn check_count(
+    starts: &[Episode],
+    stops: &[Episode],
+    runs: &[Run],
+) -> Result<(), StartStopFitError> {
+    const STARTS: usize = 5;
+    const STOPS: usize = 3;
+    const FACTOR: f64 = 5.0;
+    if starts.len() < STARTS {
+        let (found, left_out) = (starts.len(), runs.len() - starts.len());
+        return Err(StartStopFitError::TooFewStarts { found, needed: STARTS, left_out });
+    }
+    if stops.len() < STOPS {
+        return Err(StartStopFitError::TooFewStops { found: stops.len(), needed: STOPS });
+    }
+    let idle = || starts.iter().map(|start| start.idle_s);
+    let (shortest_s, longest_s) = (idle().fold(f64::MAX, f64::min), idle().fold(0.0, f64::max));
+    if longest_s < FACTOR * shortest_s {
+        return Err(StartStopFitError::IdleTimesAlike { shortest_s, longest_s, factor: FACTOR });
+    }
+    Ok(())
+}
+
+/// Times in which the command runs the pump.
+fn runs(command: &Series, flow: &Series) -> Result<Vec<Run>, StartStopFitError> {
+    let most = command.values.iter().copied().fold(0.0, f64::max);
+    if most <= 0.0 {
+        return Err(StartStopFitError::NeverCommanded { most });
+    }
+    let (mut found, mut open) = (Vec::new(), None::<Told>);
+    for (time_s, value) in command.time_s.iter().zip(&command.values) {
+        match (&mut open, *value > RUNS_SHARE * most) {
+            (None, true) => open = Some(Told { from_s: *time_s, low: *value, high: *value }),
+            (Some(told), true) => {
+                (told.low, told.high) = (told.low.min(*value), told.high.max(*value));
+            }
+            (Some(told), false) => {
+                found.push(run(flow, told, *time_s, true));
+                open = None;
+            }
+            (None, false) => {}
+        }
+    }
+    if let (Some(told), Some(to_s)) = (open, flow.time_s.last()) {
+        found.push(run(flow, &told, *to_s, false));
+    }
+    Ok(found)
+}
+
+/// What the pump is told in a run.
+#[derive(Debug, Clone, Copy)]
+struct Told {
+    from_s: f64,
+    low: f64,
+    high: f64,
+}
+
+fn run(flow: &Series, told: &Told, to_s: f64, is_told_to_stop: bool) -> Run {
+    let from_s = told.from_s;
+    let half_s = 0.5 * EVEN_SHARE * (to_s - from_s);
+    let end = flow.within(to_s - 2.0 * half_s, to_s).values;
+    let part = |from_s: f64, to_s: f64| rank::median(&mut flow.within(from_s, to_s).values);
+    let [early, late] = [part(to_s - 2.0 * half_s, to_s - half_s), part(to_s - half_s, to_s)];
+    let even = rank::median(&mut end.clone()).unwrap_or(0.0);
+    let mut off: Vec<f64> =
+        end.windows(2).filter_map(|pair| Some((pair.get(1)? - pair.first()?).abs())).collect();
+    #[expect(clippy::cast_precision_loss, reason = "some thousand samples")]
+    let chance = NOISE_FACTOR * rank::median(&mut off).unwrap_or(0.0) / (end.len() as f64).sqrt();
+    // A flow that still comes up grows from one half to the other.
+    let grows = late.zip(early).map_or(f64::INFINITY, |(late, early)| (late - early).abs());
+    let is_level = told.high - told.low <= UNEVEN_SHARE * told.high;
+    let is_even = is_level
+        && end.len() >= FEWEST_EVEN
+        && chance < even.abs()
+        && grows < UNEVEN_SHARE * even.abs() + chance;
+    Run { from_s, to_s, is_told_to_stop, flow: even, is_even }
+}
+
+fn check_flow(runs: &[Run], most: f64) -> Result<(), StartStopFitError> {
+    let mut lasted: Vec<f64> = runs.iter().map(|run| run.to_s - run.from_s).collect();
+    let usual_s = rank::median(&mut lasted).unwrap_or(0.0);
+    let dry = runs.iter().find(|run| {
+        run.flow <= NO_FLOW_SHARE * most && run.to_s - run.from_s >= SHORT_SHARE * usual_s
+    });
+    match dry {
+        None => Ok(()),
+        Some(run) => Err(StartStopFitError::NoFlow {
+            at_s: run.from_s,
+            lasted_s: run.to_s - run.from_s,
+            flow_mm3_per_s: run.flow,
+            most_mm3_per_s: most,
+        }),
+    }
+}

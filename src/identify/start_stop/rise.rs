@@ -1,0 +1,104 @@
+//! How the flow comes after a start: its delay, and the time constant that all
+//! starts have in common.
+
+use super::episodes::Episode;
+use super::fall::Falling;
+use super::least::descend;
+use super::{SeenStart, StartStopFitError};
+use crate::extruder::start_stop::StartStop;
+use crate::vision::rank;
+
+/// What was found of the starts.
+#[derive(Debug, Clone)]
+pub(super) struct Rise {
+    /// T \[s\].
+    pub time_constant_s: f64,
+    /// Its standard error \[s\].
+    pub sigma_s: f64,
+    pub starts: Vec<SeenStart>,
+}
+
+/// Range of T \[s\].
+const RISE_S: [f64; 2] = [0.005, 10.0];
+/// So many samples in a row above half the flow are no noise.
+const IN_A_ROW: usize = 3;
+
+/// The median of the time constants of all starts, and the delay of each with
+/// that.
+pub(super) fn fit(starts: &[Episode], fall: &Falling) -> Result<Rise, StartStopFitError> {
+    let fall = fall.model();
+    let rises: Vec<f64> = starts.iter().filter_map(|start| alone(start, &fall)).collect();
+    let (rise_s, sigma_s) = middle(&rises).ok_or(StartStopFitError::NoFit { what: "rise" })?;
+    if let Some(start) = starts.first().filter(|start| rise_s < start.step_s) {
+        return Err(StartStopFitError::TooSparse { step_s: start.step_s, rise_s });
+    }
+    let seen = |start: &Episode| {
+        let delay_s = delayed(start, &fall, rise_s)?;
+        let (at_s, idle_s, flow_mm3_per_s) = (start.at_s, start.idle_s, start.flow);
+        Some(SeenStart { at_s, idle_s, flow_mm3_per_s, delay_s, modelled_s: delay_s })
+    };
+    let seen: Option<Vec<SeenStart>> = starts.iter().map(seen).collect();
+    let starts = seen.ok_or(StartStopFitError::NoFit { what: "rise" })?;
+    Ok(Rise { time_constant_s: rise_s, sigma_s, starts })
+}
+
+/// Median, and its standard error from the spread about it.
+#[expect(clippy::cast_precision_loss, reason = "a recording has few starts")]
+fn middle(values: &[f64]) -> Option<(f64, f64)> {
+    let median = rank::median(&mut values.to_vec())?;
+    let mut off: Vec<f64> = values.iter().map(|value| (value - median).abs()).collect();
+    // Of normal deviations: the median of their sizes is 0.6745 σ, the standard
+    // error of a median 1.2533 σ/√n.
+    let sigma = rank::median(&mut off)? / 0.6745 * 1.2533 / (values.len() as f64).sqrt();
+    Some((median, sigma))
+}
+
+/// The share of the flow after a start with this delay and time constant: what
+/// comes anew, and what still comes of the run before.
+fn modelled(start: &Episode, fall: &StartStop, since_s: f64, [delay_s, rise_s]: [f64; 2]) -> f64 {
+    let left = |since_s: f64| start.before / start.flow * fall.falling(start.idle_s + since_s);
+    if since_s < delay_s {
+        return left(since_s);
+    }
+    1.0 - (1.0 - left(delay_s)) * libm::exp(-(since_s - delay_s) / rise_s)
+}
+
+fn solve(start: &Episode, fall: &StartStop, first: [f64; 2], rise: [f64; 2]) -> Option<[f64; 2]> {
+    let residuals = |row: &[f64]| -> Vec<f64> {
+        let &[delay_s, rise_s] = row else { return Vec::new() };
+        let of = |(at, share): &(f64, f64)| modelled(start, fall, *at, [delay_s, rise_s]) - share;
+        start.samples.iter().map(of).collect()
+    };
+    let longest_s = start.samples.last()?.0;
+    let solved = descend(&residuals, &first, &[[0.0, longest_s], rise])?;
+    let &[delay_s, rise_s] = solved.at.as_slice() else { return None };
+    Some([delay_s, rise_s])
+}
+
+/// T of one start; none where the flow had not ceased before it.
+fn alone(start: &Episode, fall: &StartStop) -> Option<f64> {
+    const CEASED: f64 = 0.1;
+    if start.before / start.flow * fall.falling(start.idle_s) > CEASED {
+        return None;
+    }
+    let half_s = half(start)?;
+    let first = [(half_s - 0.7 * fall.fall_s).max(0.0), fall.fall_s];
+    solve(start, fall, first, RISE_S).map(|[_, rise_s]| rise_s)
+}
+
+fn delayed(start: &Episode, fall: &StartStop, rise_s: f64) -> Option<f64> {
+    let half_s = half(start)?;
+    let first = [(half_s - 0.7 * rise_s).max(0.0), rise_s];
+    let almost = [rise_s * (1.0 - 1e-6), rise_s * (1.0 + 1e-6)];
+    solve(start, fall, first, almost).map(|[delay_s, _]| delay_s)
+}
+
+/// When the flow comes to half of what it will be, for good \[s\].
+fn half(start: &Episode) -> Option<f64> {
+    let above = |window: &[(f64, f64)]| window.iter().all(|(_, share)| *share > 0.5);
+    let windows = || start.samples.windows(IN_A_ROW);
+    // What still comes of the run before is no first flow.
+    let from = windows().position(|window| !above(window)).unwrap_or(0);
+    let at = from + windows().skip(from).position(above)?;
+    start.samples.get(at).map(|(at, _)| *at)
+}

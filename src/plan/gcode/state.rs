@@ -1,0 +1,147 @@
+//! What a line means after the lines before it.
+
+use super::arc::{Centre, Move};
+use super::words::Word;
+use super::{GcodeError, distance};
+
+/// Codes that change nothing about the path: the plane XY, no compensation, a work
+/// offset, exact and continuous paths, no cycle, feeds a minute.
+const IDLE: [f64; 9] = [17.0, 40.0, 49.0, 54.0, 61.0, 64.0, 80.0, 90.1, 94.0];
+const MM_PER_INCH: f64 = 25.4;
+const KNOWN: &str = "G0 to G3, G17, G20, G21, G90, G91 and G94 are, and M, S, T, \
+                     E and N are passed over; write the move with these";
+
+/// What a line moves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Motion {
+    /// Nothing.
+    None,
+    /// A rapid move.
+    Rapid,
+    /// A move that lays bead, and its feed \[mm/s\].
+    Laid(Move, f64),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mode {
+    Rapid,
+    Line,
+    Right,
+    Left,
+}
+
+/// What holds from one line to the next.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    here: [f64; 3],
+    mode: Option<Mode>,
+    relative: bool,
+    unit_mm: f64,
+    feed: Option<f64>,
+    ended: bool,
+}
+
+/// A line's places and centre, in the program's units.
+#[derive(Debug, Clone, Copy, Default)]
+struct Asked {
+    axes: [Option<f64>; 3],
+    beside: [Option<f64>; 2],
+    radius: Option<f64>,
+}
+
+impl State {
+    /// At a place \[mm\], absolute and in millimetres.
+    pub fn new(here: [f64; 3]) -> Self {
+        Self { here, mode: None, relative: false, unit_mm: 1.0, feed: None, ended: false }
+    }
+
+    /// Whether the program is over (M2, M30).
+    pub fn ended(&self) -> bool {
+        self.ended
+    }
+
+    /// Takes a line's words.
+    pub fn take(&mut self, line: usize, words: &[Word]) -> Result<Motion, GcodeError> {
+        // Units go before the numbers that are in them.
+        for (letter, number) in words {
+            if *letter == 'G' {
+                self.code(line, *number, words)?;
+            }
+        }
+        let mut asked = Asked::default();
+        for (letter, number) in words.iter().copied() {
+            match letter {
+                'X' => asked.axes[0] = Some(number),
+                'Y' => asked.axes[1] = Some(number),
+                'Z' => asked.axes[2] = Some(number),
+                'I' => asked.beside[0] = Some(number),
+                'J' => asked.beside[1] = Some(number),
+                'R' => asked.radius = Some(number),
+                'F' if number > 0.0 => self.feed = Some(number * self.unit_mm / 60.0),
+                'F' => return Err(GcodeError::Feed { line, found: number }),
+                'M' => self.ended |= number == 2.0 || number == 30.0,
+                'G' | 'S' | 'T' | 'E' | 'P' | 'D' | 'H' => {}
+                _ => return Err(unknown(line, letter, number)),
+            }
+        }
+        self.go(line, &asked)
+    }
+
+    fn code(&mut self, line: usize, number: f64, words: &[Word]) -> Result<(), GcodeError> {
+        match number {
+            0.0 => self.mode = Some(Mode::Rapid),
+            1.0 => self.mode = Some(Mode::Line),
+            2.0 => self.mode = Some(Mode::Right),
+            3.0 => self.mode = Some(Mode::Left),
+            20.0 => self.unit_mm = MM_PER_INCH,
+            21.0 => self.unit_mm = 1.0,
+            90.0 => self.relative = false,
+            91.0 => self.relative = true,
+            // Setting the feeder's own count moves nothing.
+            92.0 if words.iter().all(|(letter, _)| matches!(letter, 'G' | 'E')) => {}
+            _ if IDLE.contains(&number) => {}
+            _ => return Err(unknown(line, 'G', number)),
+        }
+        Ok(())
+    }
+
+    fn go(&mut self, line: usize, asked: &Asked) -> Result<Motion, GcodeError> {
+        let circle = asked.beside.iter().any(Option::is_some) || asked.radius.is_some();
+        if asked.axes.iter().all(Option::is_none) && !circle {
+            return Ok(Motion::None);
+        }
+        let found = || "a place without a move".to_owned();
+        let wanted = "write G0, G1, G2 or G3 on it or before";
+        let mode = self.mode.ok_or_else(|| GcodeError::Code { line, found: found(), wanted })?;
+        let from = self.here;
+        let mut to = from;
+        for (to, asked) in to.iter_mut().zip(asked.axes) {
+            let Some(asked) = asked else { continue };
+            *to = asked * self.unit_mm + if self.relative { *to } else { 0.0 };
+        }
+        self.here = to;
+        let moved = match mode {
+            Mode::Rapid => return Ok(Motion::Rapid),
+            // A line to where the nozzle is lays nothing.
+            Mode::Line if distance(from, to) <= 0.0 => return Ok(Motion::None),
+            Mode::Line => Move::Line { from, to },
+            Mode::Left | Mode::Right => {
+                let centre = self.centre(line, asked)?;
+                Move::arc(line, (from, to), centre, mode == Mode::Left)?
+            }
+        };
+        Ok(Motion::Laid(moved, self.feed.ok_or(GcodeError::NoFeed { line })?))
+    }
+
+    fn centre(&self, line: usize, asked: &Asked) -> Result<Centre, GcodeError> {
+        match (asked.beside, asked.radius) {
+            ([None, None], Some(radius)) => Ok(Centre::Radius(radius * self.unit_mm)),
+            ([None, None], None) => Err(GcodeError::NoCentre { line }),
+            (beside, _) => Ok(Centre::Beside(beside.map(|c| c.unwrap_or(0.0) * self.unit_mm))),
+        }
+    }
+}
+
+fn unknown(line: usize, letter: char, number: f64) -> GcodeError {
+    GcodeError::Code { line, found: format!("{letter}{number}"), wanted: KNOWN }
+}

@@ -1,0 +1,208 @@
+//! Where the speed has its nodes and where the width is judged: finely where the nominal
+//! speed changes quickly, coarsely elsewhere.
+
+use super::horizon::Window;
+use super::profile::SpeedProfile;
+
+/// A change of the speed of this share of the acceleration is quick.
+const QUICK: f64 = 0.1;
+/// Nodes of a horizon at most; more are put further apart.
+const MOST_NODES: usize = 220;
+/// Distances of the nodes, in lengths of the nozzle: within how far from a quick change,
+/// and how far apart.
+const NODES: [(f64, f64); 3] = [(0.5, 0.025), (2.4, 0.1), (f64::INFINITY, 0.4)];
+/// The same of the places where the width is judged over a nozzle's length.
+const PLACES: [(f64, f64); 2] = [(1.5, 0.05), (f64::INFINITY, 0.25)];
+/// The same of those where it is judged more finely; none lies about the quick change
+/// itself, whose unevenness only the nozzle's length can take up.
+const FINE_PLACES: [(f64, f64); 2] = [(1.5, 0.05), (f64::INFINITY, 0.125)];
+const FINE_FROM: f64 = 0.6;
+/// The finer length, in lengths of the nozzle, and what it counts: enough that a wave of
+/// the speed which a nozzle's length just hides is not taken for free.
+const FINE_LENGTH: f64 = 0.25;
+const FINE_WEIGHT: f64 = 0.003;
+/// Within how far of a quick change noise is weighed, in lengths of the nozzle.
+const NEAR: f64 = 5.0;
+/// How far before and after the quick changes the flow's change is taken, in lengths of
+/// the nozzle: narrowly and widely.
+const CHANGED: [(f64, f64); 2] = [(5.0, 5.0), (11.0, 14.0)];
+
+/// Stretches of path in which the nominal speed changes quickly \[mm\].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quick(Vec<(f64, f64)>);
+
+impl Quick {
+    /// Of a profile and the robot's acceleration \[mm/s²\].
+    pub fn of(profile: &SpeedProfile, accel: f64) -> Self {
+        let nodes = || profile.path().iter().zip(profile.squares());
+        let mut all: Vec<(f64, f64)> = Vec::new();
+        for ((s0, b0), (s1, b1)) in nodes().zip(nodes().skip(1)) {
+            if (b1 - b0).abs() < QUICK * 2.0 * accel * (s1 - s0) {
+                continue;
+            }
+            match all.last_mut() {
+                Some((_, end)) if *end >= *s0 => *end = *s1,
+                _ => all.push((*s0, *s1)),
+            }
+        }
+        Self(all)
+    }
+
+    /// Distance of a place from the nearest \[mm\]; infinite where there is none.
+    pub fn distance(&self, place_mm: f64) -> f64 {
+        let after = self.0.partition_point(|(_, end)| *end < place_mm);
+        let before = after.checked_sub(1).and_then(|i| self.0.get(i));
+        let back = before.map_or(f64::INFINITY, |(_, end)| place_mm - end);
+        let ahead = self.0.get(after).map_or(f64::INFINITY, |(start, _)| start - place_mm);
+        back.min(ahead).max(0.0)
+    }
+
+    /// Those that begin within a stretch \[mm\].
+    pub fn within(&self, from_mm: f64, to_mm: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.0.iter().copied().filter(move |(start, _)| *start >= from_mm && *start < to_mm)
+    }
+
+    /// The parts of a stretch over which the flow's change is taken: from before the first
+    /// to after the last, narrowly and widely \[mm\]. What is changed only outside the
+    /// one shows in the other.
+    pub fn about(&self, (from, to): (f64, f64), nozzle_mm: f64) -> [(f64, f64); 2] {
+        let mut inside = self.within(from, to);
+        let Some(first) = inside.next() else { return [(from, to); 2] };
+        let last = inside.last().unwrap_or(first);
+        CHANGED.map(|(before, after)| {
+            (from.max(first.0 - before * nozzle_mm), to.min(last.1 + after * nozzle_mm))
+        })
+    }
+
+    /// Places from one to another, both included, as far apart as the distance from here
+    /// says.
+    fn places(&self, (from, to): (f64, f64), unit: f64, steps: &[(f64, f64)]) -> Vec<f64> {
+        let mut all = Vec::new();
+        let mut at = from;
+        while at < to {
+            all.push(at);
+            // The finest step that is not left before it ends.
+            let fitting = steps.iter().rev().map(|(_, step)| step * unit).find(|step| {
+                let near = self.distance(at + step).min(self.distance(at));
+                steps
+                    .iter()
+                    .find(|(reach, _)| near <= reach * unit)
+                    .is_none_or(|s| s.1 * unit >= *step)
+            });
+            at += fitting.or_else(|| steps.first().map(|s| s.1 * unit)).unwrap_or(unit);
+        }
+        all.push(to);
+        all
+    }
+
+    /// Nodes of the speed from one place to another \[mm\]. Those of the nominal speed are
+    /// among them, so that a straight line between two nodes lies nowhere above it and the
+    /// nominal speed itself can be planned.
+    pub fn nodes(&self, nominal: &SpeedProfile, span: (f64, f64), nozzle_mm: f64) -> Vec<f64> {
+        let turns = turns(nominal, span);
+        let mut unit = nozzle_mm;
+        loop {
+            let even = self.places(span, unit, &NODES);
+            let apart = 0.5 * unit * NODES.first().map_or(0.0, |(_, step)| *step);
+            let merged = merge(&even, &turns, apart);
+            if merged.len() <= MOST_NODES.max(turns.len() + 2) || unit > 8.0 * nozzle_mm {
+                return merged;
+            }
+            unit *= 1.2;
+        }
+    }
+
+    /// Where the width is judged, over pieces that lie within a stretch \[mm\].
+    pub fn windows(&self, (from, to): (f64, f64), nozzle_mm: f64) -> Vec<Window> {
+        let mut all = Vec::new();
+        let fine = FINE_LENGTH * nozzle_mm;
+        let sets = [
+            (nozzle_mm, 1.0, &PLACES, f64::NEG_INFINITY),
+            (fine, FINE_WEIGHT, &FINE_PLACES, FINE_FROM * nozzle_mm),
+        ];
+        for (length_mm, weight, steps, beyond) in sets {
+            let inside = (from + 0.5 * length_mm, to - 0.5 * length_mm);
+            if inside.1 <= inside.0 {
+                continue;
+            }
+            let places = self.places(inside, nozzle_mm, steps);
+            let next = places.iter().skip(1).chain(places.last());
+            let before = places.first().into_iter().chain(&places);
+            for ((at_mm, next), before) in places.iter().zip(next).zip(before) {
+                let distance = self.distance(*at_mm);
+                if distance > beyond {
+                    let weight = weight * 0.5 * (next - before);
+                    let near = distance <= NEAR * nozzle_mm;
+                    all.push(Window { at_mm: *at_mm, length_mm, weight, near });
+                }
+            }
+        }
+        all
+    }
+}
+
+/// Places within a stretch at which a profile's acceleration changes \[mm\].
+fn turns(profile: &SpeedProfile, (from, to): (f64, f64)) -> Vec<f64> {
+    let nodes = || profile.path().iter().zip(profile.squares());
+    let slope = |a: (&f64, &f64), b: (&f64, &f64)| (b.1 - a.1) / (b.0 - a.0);
+    nodes()
+        .zip(nodes().skip(1))
+        .zip(nodes().skip(2))
+        .filter(|((a, b), c)| slope(*a, *b) != slope(*b, *c))
+        .map(|((_, b), _)| *b.0)
+        .filter(|s| *s > from && *s < to)
+        .collect()
+}
+
+/// Both rows in order, without those of the first that lie too near to one of the second;
+/// the ends stay.
+fn merge(even: &[f64], given: &[f64], apart: f64) -> Vec<f64> {
+    let ends = [even.first(), even.last()];
+    let far = |s: &f64| given.iter().all(|g| (g - s).abs() > apart);
+    let mut all: Vec<f64> =
+        even.iter().filter(|s| ends.contains(&Some(s)) || far(s)).chain(given).copied().collect();
+    all.sort_by(f64::total_cmp);
+    all.dedup();
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+
+    fn corner() -> SpeedProfile {
+        let top = 100.0;
+        SpeedProfile::new(&[(-300.0, top), (-2.499, top), (0.0, 2.0), (2.499, top), (300.0, top)])
+            .unwrap()
+    }
+
+    #[test]
+    fn a_corner_is_one_quick_stretch_with_its_apex_among_the_nodes() {
+        let profile = corner();
+        let quick = Quick::of(&profile, 2000.0);
+        assert_eq!(quick, Quick(vec![(-2.499, 2.499)]));
+        assert_eq!(quick.distance(-12.499), 10.0);
+        let nodes = quick.nodes(&profile, (-200.0, 250.0), 20.0);
+        assert!(nodes.contains(&0.0) && nodes.len() <= MOST_NODES, "{}", nodes.len());
+        assert_eq!((nodes[0], nodes[nodes.len() - 1]), (-200.0, 250.0));
+        for pair in nodes.windows(2) {
+            let near = quick.distance(pair[0]).min(quick.distance(pair[1]));
+            let most = if near <= 10.0 { 0.5 } else { 8.0 };
+            // One that lay too near to a node of the profile is left out.
+            let most = most + 0.25;
+            assert!(pair[1] > pair[0] && pair[1] - pair[0] <= most + 1e-9, "{pair:?}");
+        }
+    }
+
+    #[test]
+    fn the_windows_weigh_what_the_path_is_long() {
+        let quick = Quick::of(&corner(), 2000.0);
+        let windows = quick.windows((-200.0, 250.0), 20.0);
+        let coarse = windows.iter().filter(|w| w.length_mm == 20.0);
+        let sum: f64 = coarse.map(|w| w.weight).sum();
+        assert!((sum - 430.0).abs() < 1e-9, "{sum}");
+        assert!(windows.iter().all(|w| w.at_mm - 0.5 * w.length_mm >= -200.0));
+    }
+}

@@ -1,0 +1,164 @@
+//! The planned profile of a job from a table: path length, position and nominal speed.
+
+use super::profile::{ProfileError, SpeedProfile};
+
+/// Columns that are read; others are left alone.
+const PATH: &str = "path_mm";
+const SPEED: &str = "speed_mm_per_s";
+const POSITION: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
+
+/// A job's path and its nominal speed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Job {
+    /// Nominal speed over path.
+    pub speed: SpeedProfile,
+    /// Where the nozzle is at each point of the path, in order: path and position \[mm\].
+    /// Between two points it goes straight.
+    pub position: Vec<(f64, [f64; 3])>,
+}
+
+/// A table that is no job. Lines are counted from 1, the heading included.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum JobError {
+    /// A column is missing.
+    #[error("the heading has no column {column}: a job has {PATH}, x_mm, y_mm, z_mm and {SPEED}")]
+    Column {
+        /// Which one.
+        column: &'static str,
+    },
+    /// A row that is not as long as the heading, or no text.
+    #[error("line {line}: {what}; give each row as many fields as the heading has")]
+    Row {
+        /// Where.
+        line: u64,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A field that is no number.
+    #[error("line {line}: {column} is \"{found}\"; a number is expected")]
+    Number {
+        /// Where.
+        line: u64,
+        /// Which column.
+        column: &'static str,
+        /// What was found.
+        found: String,
+    },
+    /// Path that is shorter than the way between two positions.
+    #[error(
+        "line {line}: {path_mm} mm of path for {way_mm:.3} mm of way since the line before; \
+         path length is counted along the way"
+    )]
+    Way {
+        /// Where.
+        line: u64,
+        /// Path since the line before \[mm\].
+        path_mm: f64,
+        /// Way between the positions \[mm\].
+        way_mm: f64,
+    },
+    /// The speeds make no profile; points are the rows below the heading.
+    #[error("the speeds: {0}")]
+    Profile(#[from] ProfileError),
+}
+
+/// A way may be longer than its path by rounding: this share of it and this much \[mm\].
+const ROUNDED: (f64, f64) = (1e-3, 0.01);
+
+/// Reads a job from the text of a table with a heading.
+pub fn read(text: &str) -> Result<Job, JobError> {
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let heading = reader.headers().map_err(|error| of_row(&error))?.clone();
+    let place = |column: &'static str| {
+        heading.iter().position(|name| name == column).ok_or(JobError::Column { column })
+    };
+    let (path, speed) = ((PATH, place(PATH)?), (SPEED, place(SPEED)?));
+    let [x, y, z] = POSITION.map(|column| place(column).map(|at| (column, at)));
+    let axes = [x?, y?, z?];
+    let (mut nodes, mut position) = (Vec::new(), Vec::new());
+    let mut before: Option<(f64, [f64; 3])> = None;
+    for record in reader.records() {
+        let record = record.map_err(|error| of_row(&error))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |column: (&'static str, usize)| number(&record, line, column);
+        let here = (number(path)?, [number(axes[0])?, number(axes[1])?, number(axes[2])?]);
+        if let Some(before) = before {
+            check_way(line, before, here)?;
+        }
+        nodes.push((here.0, number(speed)?));
+        position.push(here);
+        before = Some(here);
+    }
+    Ok(Job { speed: SpeedProfile::new(&nodes)?, position })
+}
+
+fn number(
+    record: &csv::StringRecord,
+    line: u64,
+    (column, at): (&'static str, usize),
+) -> Result<f64, JobError> {
+    let found = record.get(at).unwrap_or_default();
+    let value = found.parse().ok().filter(|value: &f64| value.is_finite());
+    value.ok_or_else(|| JobError::Number { line, column, found: found.to_owned() })
+}
+
+fn check_way(
+    line: u64,
+    (before_mm, from): (f64, [f64; 3]),
+    (here_mm, to): (f64, [f64; 3]),
+) -> Result<(), JobError> {
+    let way_mm = super::gcode::distance(from, to);
+    let path_mm = here_mm - before_mm;
+    // A path that does not grow is for the profile to say.
+    if path_mm > 0.0 && way_mm > path_mm * (1.0 + ROUNDED.0) + ROUNDED.1 {
+        return Err(JobError::Way { line, path_mm, way_mm });
+    }
+    Ok(())
+}
+
+fn of_row(error: &csv::Error) -> JobError {
+    let line = error.position().map_or(1, csv::Position::line);
+    let what = match error.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("{len} fields where the heading has {expected_len}")
+        }
+        csv::ErrorKind::Utf8 { .. } => "this is no text".to_owned(),
+        _ => error.to_string(),
+    };
+    JobError::Row { line, what }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+
+    const TABLE: &str = "path_mm,x_mm,y_mm,z_mm,speed_mm_per_s,note
+0,0,0,5,100,start
+50, 50, 0, 5, 2, corner
+100,50,50,5,100,end
+";
+
+    #[test]
+    fn a_table_is_a_profile_with_positions() {
+        let job = read(TABLE).unwrap();
+        assert_eq!(job.speed.path(), [0.0, 50.0, 100.0]);
+        assert!((job.speed.speed_at(50.0) - 2.0).abs() < 1e-12);
+        assert_eq!(job.position[1], (50.0, [50.0, 0.0, 5.0]));
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_line() {
+        let word = |from: &str, to: &str| read(&TABLE.replace(from, to)).unwrap_err().to_string();
+        assert!(word("z_mm", "height").contains("no column z_mm"));
+        let words = word("50, 50, 0, 5, 2,", "50, 50, 0, 5, slow,");
+        assert!(words.contains("line 3") && words.contains("\"slow\""), "{words}");
+        let words = word("100,50,50,5,100,end", "100,50,50,5");
+        assert!(words.contains("line 4") && words.contains("4 fields"), "{words}");
+        let words = word("100,50,50,", "80,50,50,");
+        assert!(words.contains("line 4") && words.contains("30 mm of path"), "{words}");
+        let words = word("50, 50, 0, 5, 2,", "0, 0, 0, 5, 2,");
+        assert!(words.contains("point 2"), "{words}");
+    }
+}

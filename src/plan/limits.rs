@@ -1,0 +1,175 @@
+//! Limits of the speed along a path, and the quickest way to keep them.
+
+use super::profile::{ProfileError, SpeedProfile};
+
+/// How fast a path may be passed: a limit for each node and one for each piece between
+/// two of them.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PathLimits {
+    path: Vec<f64>,
+    nodes: Vec<f64>,
+    pieces: Vec<f64>,
+}
+
+impl PathLimits {
+    /// A path that begins at a place \[mm\] with at most a speed \[mm/s\].
+    pub fn new(start_mm: f64, speed_mm_per_s: f64) -> Self {
+        Self { path: vec![start_mm], nodes: vec![speed_mm_per_s], pieces: Vec::new() }
+    }
+
+    /// Goes on to a place \[mm\], on the way with at most one speed and there with at most
+    /// another \[mm/s\].
+    pub fn to(&mut self, path_mm: f64, on_the_way_mm_per_s: f64, there_mm_per_s: f64) {
+        self.path.push(path_mm);
+        self.pieces.push(on_the_way_mm_per_s);
+        self.nodes.push(there_mm_per_s);
+    }
+
+    /// Where the path ends \[mm\].
+    pub fn end_mm(&self) -> f64 {
+        self.path.last().copied().unwrap_or(0.0)
+    }
+}
+
+/// The quickest profile within the limits and an acceleration \[mm/s²\]: limits are carried
+/// forwards and backwards as far as the acceleration reaches, and between two nodes the
+/// speed rises, stays at the piece's limit and falls.
+pub fn time_optimal(limits: &PathLimits, accel: f64) -> Result<SpeedProfile, ProfileError> {
+    if !(accel.is_finite() && accel > 0.0) {
+        return Err(ProfileError::Acceleration { value: accel });
+    }
+    check(limits)?;
+    let square = |speed: &f64| speed * speed;
+    let pieces: Vec<f64> = limits.pieces.iter().map(square).collect();
+    let mut nodes: Vec<f64> = limits.nodes.iter().map(square).collect();
+    for (i, piece) in pieces.iter().enumerate() {
+        for node in nodes.iter_mut().skip(i).take(2) {
+            *node = node.min(*piece);
+        }
+    }
+    reach(&limits.path, &mut nodes, accel);
+    let mut all = Vec::with_capacity(3 * nodes.len());
+    let ends = limits.path.iter().zip(&nodes);
+    for (((s0, b0), (s1, b1)), top) in ends.clone().zip(ends.skip(1)).zip(&pieces) {
+        all.push((*s0, *b0));
+        all.extend(between((*s0, *b0), (*s1, *b1), *top, accel));
+    }
+    all.extend(limits.path.last().copied().zip(nodes.last().copied()));
+    SpeedProfile::of_squares(&all)
+}
+
+fn check(limits: &PathLimits) -> Result<(), ProfileError> {
+    if limits.path.len() < 2 {
+        return Err(ProfileError::Short { nodes: limits.path.len() });
+    }
+    let numbered = |speeds: &[f64]| (1..).zip(speeds.to_vec()).collect::<Vec<(usize, f64)>>();
+    for (at, speed) in numbered(&limits.nodes) {
+        if !(speed.is_finite() && speed >= 0.0) {
+            return Err(ProfileError::Speed { at, speed });
+        }
+    }
+    for (at, speed) in numbered(&limits.pieces) {
+        if !(speed.is_finite() && speed > 0.0) {
+            return Err(ProfileError::Speed { at, speed });
+        }
+    }
+    let neighbours = limits.path.iter().zip(limits.path.iter().skip(1));
+    for (at, (before_mm, path_mm)) in (2..).zip(neighbours) {
+        if !(path_mm > before_mm && path_mm.is_finite()) {
+            return Err(ProfileError::Order { at, path_mm: *path_mm, before_mm: *before_mm });
+        }
+    }
+    Ok(())
+}
+
+/// Lowers squares of the speed until each can be reached from the one before it and be
+/// left for the one after it.
+pub(super) fn reach(path: &[f64], squares: &mut [f64], accel: f64) {
+    for i in 1..squares.len().min(path.len()) {
+        squares[i] = squares[i].min(squares[i - 1] + 2.0 * accel * (path[i] - path[i - 1]));
+    }
+    for i in (1..squares.len().min(path.len())).rev() {
+        squares[i - 1] = squares[i - 1].min(squares[i] + 2.0 * accel * (path[i] - path[i - 1]));
+    }
+}
+
+/// The nodes that a piece needs between its ends: where it reaches the top, and where it
+/// leaves it.
+fn between(
+    (s0, b0): (f64, f64),
+    (s1, b1): (f64, f64),
+    top: f64,
+    accel: f64,
+) -> impl Iterator<Item = (f64, f64)> {
+    let peak = (0.5 * (b0 + b1) + accel * (s1 - s0)).min(top);
+    let (up, down) = (s0 + (peak - b0) / (2.0 * accel), s1 - (peak - b1) / (2.0 * accel));
+    // Nodes nearer than this to another are the same.
+    let apart = 1e-9 * (s1 - s0);
+    let rises = (up > s0 + apart && up < s1 - apart).then_some((up, peak));
+    let falls = down > s0 + apart && down < s1 - apart && down > up + apart;
+    rises.into_iter().chain(falls.then_some((down, peak)))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_corner_is_approached_at_the_last_moment() {
+        let mut limits = PathLimits::new(-100.0, 100.0);
+        limits.to(0.0, 100.0, 2.0);
+        limits.to(100.0, 100.0, 100.0);
+        let profile = time_optimal(&limits, 2000.0).unwrap();
+        // From 100 mm/s to 2 mm/s at 2 m/s²: 49 ms and (100² − 2²)/4000 mm.
+        assert_eq!(profile.path(), [-100.0, -2.499, 0.0, 2.499, 100.0]);
+        let wanted = 2.0 * ((100.0 - 2.499) / 100.0 + 0.049);
+        assert!((profile.duration_s() - wanted).abs() < 1e-12);
+        assert!((profile.speed_at(-1.0) - (4.0_f64 + 4000.0).sqrt()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn from_rest_to_rest_is_a_triangle_where_the_way_is_short() {
+        let mut limits = PathLimits::new(0.0, 0.0);
+        limits.to(10.0, 1000.0, 0.0);
+        let profile = time_optimal(&limits, 1000.0).unwrap();
+        assert!((profile.duration_s() - 2.0 * (10.0_f64 / 1000.0).sqrt()).abs() < 1e-12);
+        assert!((profile.speed_at(5.0) - 100.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn limits_that_are_none_are_refused() {
+        let mut limits = PathLimits::new(0.0, 10.0);
+        assert_eq!(time_optimal(&limits, 1.0), Err(ProfileError::Short { nodes: 1 }));
+        limits.to(0.0, 10.0, 10.0);
+        assert!(matches!(time_optimal(&limits, 1.0), Err(ProfileError::Order { at: 2, .. })));
+        let mut limits = PathLimits::new(0.0, 10.0);
+        limits.to(5.0, 0.0, 10.0);
+        assert!(matches!(time_optimal(&limits, 1.0), Err(ProfileError::Speed { at: 1, .. })));
+        assert!(matches!(time_optimal(&limits, 0.0), Err(ProfileError::Acceleration { .. })));
+    }
+
+    proptest! {
+        #[test]
+        fn every_limit_is_kept_and_the_speed_is_never_lower_than_need_be(
+            pieces in prop::collection::vec((0.1..50.0_f64, 1.0..200.0_f64, 0.0..200.0_f64), 1..20),
+        ) {
+            let accel = 500.0;
+            let mut limits = PathLimits::new(0.0, 30.0);
+            for (length, way, there) in pieces {
+                limits.to(limits.end_mm() + length, way, there);
+            }
+            let profile = time_optimal(&limits, accel).unwrap();
+            for ((s, piece), node) in limits.path.iter().zip(&limits.pieces).zip(&limits.nodes) {
+                prop_assert!(profile.speed_at(*s) <= node + 1e-9);
+                prop_assert!(profile.speed_at(s + 0.05) <= piece + 1e-6);
+            }
+            let nodes = profile.path().iter().zip(profile.squares());
+            for ((s0, b0), (s1, b1)) in nodes.clone().zip(nodes.skip(1)) {
+                prop_assert!((b1 - b0).abs() <= 2.0 * accel * (s1 - s0) * (1.0 + 1e-6) + 1e-6);
+            }
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! The convex problem of one round: ½·xᵀPx + qᵀx, with rows that must not exceed their
+//! bounds. Clarabel's interior point solves it.
+
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{
+    DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT,
+};
+use nalgebra::{DMatrix, DVector};
+
+/// Rows A·x ≤ bound, as (row, column, value).
+#[derive(Debug, Clone, Default)]
+pub struct Rows {
+    places: (Vec<usize>, Vec<usize>),
+    values: Vec<f64>,
+    bounds: Vec<f64>,
+}
+
+impl Rows {
+    /// Adds Σ value·x(column) ≤ bound.
+    pub fn at_most(&mut self, terms: impl IntoIterator<Item = (usize, f64)>, bound: f64) {
+        for (column, value) in terms {
+            self.places.0.push(self.bounds.len());
+            self.places.1.push(column);
+            self.values.push(value);
+        }
+        self.bounds.push(bound);
+    }
+}
+
+/// The least of ½·xᵀPx + qᵀx under the rows; `None` where the solver finds none.
+pub fn least(p: &DMatrix<f64>, q: &DVector<f64>, rows: Rows) -> Option<DVector<f64>> {
+    let unknowns = q.len();
+    let upper = upper_triangle(p);
+    let count = rows.bounds.len();
+    let a =
+        CscMatrix::new_from_triplets(count, unknowns, rows.places.0, rows.places.1, rows.values);
+    let settings = DefaultSettingsBuilder::default().verbose(false).max_iter(60).build().ok()?;
+    let cones = [SupportedConeT::NonnegativeConeT(count)];
+    let mut solver =
+        DefaultSolver::new(&upper, q.as_slice(), &a, &rows.bounds, &cones, settings).ok()?;
+    solver.solve();
+    let found = matches!(solver.solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved);
+    let x = DVector::from_column_slice(&solver.solution.x);
+    (found && x.iter().all(|v| v.is_finite())).then_some(x)
+}
+
+fn upper_triangle(p: &DMatrix<f64>) -> CscMatrix<f64> {
+    let n = p.ncols();
+    let (mut starts, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
+    for (column, entries) in p.column_iter().enumerate() {
+        for (row, value) in entries.iter().enumerate().take(column + 1) {
+            rows.push(row);
+            values.push(*value);
+        }
+        starts.push(rows.len());
+    }
+    CscMatrix::new(n, n, starts, rows, values)
+}

@@ -1,0 +1,78 @@
+//! What is usual: an extruder that is driven constantly, or in proportion to the robot's
+//! speed.
+
+use super::{BEAD, CornerError, Laid, Run, Scenario};
+use crate::plan::SpeedProfile;
+
+/// How the voltage is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Drive {
+    /// It stays.
+    Constant,
+    /// In proportion to the robot's speed at that moment.
+    Proportional,
+}
+
+/// An extruder without a plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Baseline {
+    /// Its voltage.
+    pub drive: Drive,
+    /// Whether the robot goes as planned, and not at its nominal speed.
+    pub planned_speed: bool,
+}
+
+impl Baseline {
+    /// Each voltage with its own and with the planned speed.
+    pub const ALL: [Self; 4] = [
+        Self { drive: Drive::Constant, planned_speed: false },
+        Self { drive: Drive::Constant, planned_speed: true },
+        Self { drive: Drive::Proportional, planned_speed: false },
+        Self { drive: Drive::Proportional, planned_speed: true },
+    ];
+
+    /// A run at the level of the voltage that holds the width on a straight.
+    pub fn run(self, scenario: &Scenario, planned: &SpeedProfile) -> Result<Run, CornerError> {
+        let nominal = scenario.nominal()?;
+        let speed = if self.planned_speed { planned } else { &nominal };
+        self.at_level(scenario, speed, 1.0)
+    }
+
+    /// The same at the level that leaves the least error within the judged path, even though
+    /// the straight is then too thin.
+    pub fn run_at_best_level(
+        self,
+        scenario: &Scenario,
+        planned: &SpeedProfile,
+    ) -> Result<Run, CornerError> {
+        let nominal = scenario.nominal()?;
+        let speed = if self.planned_speed { planned } else { &nominal };
+        let level = best_level(&self.at_level(scenario, speed, 1.0)?.quiet());
+        self.at_level(scenario, speed, level)
+    }
+
+    fn at_level(
+        self,
+        scenario: &Scenario,
+        speed: &SpeedProfile,
+        level: f64,
+    ) -> Result<Run, CornerError> {
+        let volts = level * BEAD.area_mm2 / Scenario::extruder()?.dc_gain();
+        match self.drive {
+            Drive::Constant => Run::new(scenario, speed, |_| volts * scenario.speed_mm_per_s),
+            Drive::Proportional => {
+                Run::new(scenario, speed, |now| volts * speed.speed_at(speed.path_at(now)))
+            }
+        }
+    }
+}
+
+/// Least squares of level·(1 + error) − 1.
+fn best_level(laid: &Laid) -> f64 {
+    let (mut first, mut second) = (0.0, 0.0);
+    for (_, error) in laid.along() {
+        first += 1.0 + error;
+        second += (1.0 + error) * (1.0 + error);
+    }
+    first / second
+}

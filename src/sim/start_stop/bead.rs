@@ -1,0 +1,152 @@
+//! Beads with pauses between them, laid by the rules of a strategy.
+
+use super::melt::{Machine, Melt};
+use crate::extruder::start_stop::{Laid, Pause, Timing};
+use crate::time::Span;
+
+/// How starts and stops are timed.
+pub trait Strategy {
+    /// A start after a pause: from the command to run until the robot goes
+    /// \[s\], and the speed of a robot that goes, so long after that command,
+    /// as a share of its start speed.
+    fn begins(&self, pause: &Pause) -> (f64, impl Fn(Span) -> f64);
+
+    /// A stop: how far from the end of the bead the pump is told \[mm\], and
+    /// the robot's speed so long after that.
+    fn ends(&self) -> (f64, impl Fn(Span) -> f64);
+}
+
+impl Strategy for Timing {
+    fn begins(&self, pause: &Pause) -> (f64, impl Fn(Span) -> f64) {
+        let start = self.start(pause);
+        (start.robot().secs(), move |since| start.robot_share(since))
+    }
+
+    fn ends(&self) -> (f64, impl Fn(Span) -> f64) {
+        let stop = self.stop();
+        (stop.way().get(), move |since| stop.robot_share(since))
+    }
+}
+
+/// What is missing on the path and what came where none was wanted \[mm³\].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Score {
+    /// Less than the path needed, while the robot travelled it.
+    pub void_mm3: f64,
+    /// More than the path needed, and all that came while the robot stood.
+    pub drool_mm3: f64,
+}
+
+impl Score {
+    /// Both together \[mm³\].
+    pub fn sum_mm3(&self) -> f64 {
+        self.void_mm3 + self.drool_mm3
+    }
+
+    /// With another.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            void_mm3: self.void_mm3 + other.void_mm3,
+            drool_mm3: self.drool_mm3 + other.drool_mm3,
+        }
+    }
+}
+
+/// A robot and the beads that it lays.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bench {
+    /// Flow and speed; the share is that of a strategy.
+    pub laid: Laid,
+    /// Length of a bead \[mm\].
+    pub bead_mm: f64,
+    /// Time constant with which the robot follows the speed that it is told
+    /// \[s\].
+    pub robot_s: f64,
+}
+
+/// Where a pause and the beads beside it have come to.
+struct Run<'a, S> {
+    bench: &'a Bench,
+    strategy: &'a S,
+    melt: Melt,
+    speed_share: f64,
+    score: Score,
+}
+
+impl Bench {
+    /// The end of a bead, a pause from the moment when the robot was at its end,
+    /// and the bead after it; a score for each pause \[s\] in its order.
+    pub fn lay<S: Strategy>(
+        &self,
+        machine: Machine,
+        seed: u64,
+        strategy: &S,
+        idle_s: &[f64],
+    ) -> Vec<Score> {
+        let melt = Melt::flowing(machine, seed);
+        let score = Score::default();
+        let mut run = Run { bench: self, strategy, melt, speed_share: 1.0, score };
+        let one = |idle_s: &f64| {
+            run.score = Score::default();
+            let stopped_s = run.finish();
+            run.stand_until(run.melt.now_s() + idle_s);
+            run.begin(stopped_s);
+            run.score
+        };
+        idle_s.iter().map(one).collect()
+    }
+}
+
+impl<S: Strategy> Run<'_, S> {
+    /// Goes on by one step with the robot told a share of its speed; returns the
+    /// way that it made \[mm\].
+    fn step(&mut self, told_share: f64) -> f64 {
+        let (dt_s, came_mm3) = self.melt.advance();
+        let kept = libm::exp(-dt_s / self.bench.robot_s);
+        self.speed_share = if told_share > 0.0 {
+            told_share + (self.speed_share - told_share) * kept
+        } else {
+            0.0
+        };
+        let wanted_mm3 = self.bench.laid.flow.get() * self.speed_share * dt_s;
+        self.score.void_mm3 += (wanted_mm3 - came_mm3).max(0.0);
+        self.score.drool_mm3 += (came_mm3 - wanted_mm3).max(0.0);
+        self.bench.laid.speed.get() * self.speed_share * dt_s
+    }
+
+    /// Lays the last part of a bead; returns when the pump was told to stop
+    /// \[s\].
+    fn finish(&mut self) -> f64 {
+        let stopped_s = self.melt.now_s();
+        self.melt.command(0.0);
+        let (mut rest_mm, share) = self.strategy.ends();
+        while rest_mm > 0.0 {
+            let since = Span::from_secs(self.melt.now_s() - stopped_s);
+            rest_mm -= self.step(share(since));
+        }
+        stopped_s
+    }
+
+    fn stand_until(&mut self, until_s: f64) {
+        while self.melt.now_s() < until_s {
+            self.step(0.0);
+        }
+    }
+
+    /// Starts a bead and lays it up to where its end begins.
+    fn begin(&mut self, stopped_s: f64) {
+        let told_s = self.melt.now_s();
+        let flow = self.bench.laid.flow;
+        let pause = Pause { idle: Span::from_secs(told_s - stopped_s), before: flow };
+        self.melt.command(flow.get());
+        let (waits_s, share) = self.strategy.begins(&pause);
+        self.stand_until(told_s + waits_s);
+        let (end_mm, _) = self.strategy.ends();
+        let mut rest_mm = self.bench.bead_mm - end_mm;
+        while rest_mm > 0.0 {
+            let since = Span::from_secs(self.melt.now_s() - told_s);
+            rest_mm -= self.step(share(since));
+        }
+    }
+}
