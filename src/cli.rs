@@ -30,6 +30,7 @@ pub mod board;
 pub mod calibrate;
 pub mod cell;
 pub mod check;
+pub mod compare;
 pub mod convert;
 pub mod demo;
 pub mod excite;
@@ -90,6 +91,7 @@ enum Command {
     Verify(verify::VerifyArgs),
     Convert(convert::ConvertArgs),
     Simulate(simulate::SimulateArgs),
+    Compare(compare::CompareArgs),
     Render(render::RenderArgs),
     RobotSim(robot_sim::RobotSimArgs),
     ExtruderSim(extruder_sim::ExtruderSimArgs),
@@ -137,6 +139,7 @@ pub fn main() -> ExitCode {
         Command::Convert(args) => convert::run(args, voice).map(|()| ExitCode::SUCCESS),
         Command::Calibrate(args) => calibrate::run(args),
         Command::Simulate(args) => simulate::run(args, voice),
+        Command::Compare(args) => compare::run(args, voice),
         Command::Render(args) => render::run(args, voice).map(|()| ExitCode::SUCCESS),
         Command::RobotSim(args) => robot_sim::run(args).map(|()| ExitCode::SUCCESS),
         Command::ExtruderSim(args) => extruder_sim::run(args).map(|()| ExitCode::SUCCESS),

@@ -7,6 +7,7 @@
 
 pub mod accuracy;
 pub mod calibration;
+pub mod compare;
 pub mod edges;
 pub mod identify;
 pub mod log;

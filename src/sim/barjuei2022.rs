@@ -9,14 +9,12 @@ mod stack;
 mod stand_off;
 #[cfg(test)]
 mod tests;
-mod trial;
 
 pub use contender::{Contender, Rates};
 pub use disturbed::{Disturbance, Wrong, step_settles, unrest, wrong};
 pub use layers::{LayerResult, lay, settles_unseen, with_frames};
 pub use stack::{Stack, stack};
 pub use stand_off::{StandOff, camera_above, stand_off};
-pub use trial::Trial;
 
 /// Scale of the paper's camera, section 4.3.1 \[mm/px\].
 pub const MM_PER_PX: f64 = 0.126_582;
@@ -47,4 +45,9 @@ pub const LAYERS: [Layer; 4] = [
 
 const fn layer(target_mm: f64, mean_error_mm: f64, rms_error_mm: f64, speed: f64) -> Layer {
     Layer { target_mm, mean_error_mm, rms_error_mm, mean_speed_mm_per_s: speed }
+}
+
+/// The paper's camera: one scale, and nothing of heights.
+pub fn scale() -> crate::calib::Calibration {
+    crate::calib::Calibration::Scale { mm_per_px: MM_PER_PX, sigma: None }
 }

@@ -68,6 +68,9 @@ pub const RIGHT_EDGE: Ink = ink("right-edge", [240, 228, 66], [240, 228, 66]);
 /// The gauge in a picture.
 pub const GAUGE: Ink = ink("gauge", [0, 158, 115], [0, 158, 115]);
 
+/// Controllers beside each other, in order.
+pub const CONTENDERS: [Ink; 6] = [PAPER, OURS, TRACKING, SETPOINT, LIMIT, FILLED];
+
 const ALL: [Ink; 22] = [
     WIDTH, TARGET, SPEED, SETPOINT, DEMAND, LIMIT, REJECTED, FLOW, PRESSURE, SCREW, FILLED, MODEL,
     PAPER, OURS, IDLE, PRIMING, TRACKING, HOLDING, FAULT, LEFT_EDGE, RIGHT_EDGE, GAUGE,

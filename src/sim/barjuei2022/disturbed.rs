@@ -2,10 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::{Contender, Trial};
+use super::{Contender, scale};
 use crate::config::cell::{Cell, RunPart};
 use crate::sim::cell::SimError;
 use crate::sim::score::{mean, median};
+use crate::sim::trial::Trial;
 use crate::units::Mm;
 
 /// Width of the disturbed layers \[mm\].
@@ -72,7 +73,8 @@ pub fn unrest(
     let (mut cell, mut run) = who.enter(cell, run, TARGET_MM);
     let from = what.enter(&mut cell, &mut run);
     let open = TARGET_MM * SHARE / std::f64::consts::SQRT_2;
-    let found = each(seeds, |seed| Ok(Trial::lay(&cell, &run, seed)?.rms_error(from) / open))?;
+    let found =
+        each(seeds, |seed| Ok(Trial::lay(&cell, &run, &scale(), seed)?.rms_error(from) / open))?;
     Ok(mean(found.into_iter()))
 }
 
@@ -92,7 +94,7 @@ pub fn step_settles(
         let at = 1000.0 + (3 * seed) as f64;
         cell.simulation.flow.step_at_mm = at;
         cell.simulation.flow.step_ratio = 1.08;
-        Ok(Trial::lay(&cell, &run, seed)?.settles_within(at, 0.5))
+        Ok(Trial::lay(&cell, &run, &scale(), seed)?.settles_within(at, 0.5))
     })?;
     Ok(median(&mut found))
 }
@@ -126,7 +128,7 @@ pub fn wrong(
     cell.simulation.missing_share = what.missing;
     let told = what.offset;
     let mut found = each(seeds, |seed| {
-        let trial = Trial::lay_told(&cell, &run, told, seed)?;
+        let trial = Trial::lay_told((&cell, &run), &scale(), told, seed)?;
         Ok(trial.rms_error(trial.begun_mm + 500.0))
     })?;
     Ok(median(&mut found))

@@ -1,11 +1,12 @@
 //! The four layers.
 
 use super::disturbed::each;
-use super::{Contender, Trial};
+use super::{Contender, scale};
 use crate::config::cell::{Cell, RunPart};
 use crate::config::rendered::Level;
 use crate::sim::cell::SimError;
 use crate::sim::score::{Score, median};
+use crate::sim::trial::Trial;
 use crate::units::Mm;
 use crate::vision::Method;
 
@@ -43,7 +44,7 @@ pub struct LayerResult {
 
 /// Lays a layer with several seeds, in parallel, and takes medians.
 pub fn lay(cell: &Cell, run: &RunPart, seeds: u64) -> Result<LayerResult, SimError> {
-    let trials = each(seeds, |seed| Trial::lay(cell, run, seed))?;
+    let trials = each(seeds, |seed| Trial::lay(cell, run, &scale(), seed))?;
     let of =
         |value: &dyn Fn(&Trial) -> f64| median(&mut trials.iter().map(value).collect::<Vec<f64>>());
     let settled = of(&|trial| trial.settles_within(trial.begun_mm, 0.5));
@@ -73,7 +74,7 @@ pub fn settles_unseen(
     let (cell, mut run) = who.enter(cell, run, target_mm);
     run.robot.start_length = Mm::ZERO;
     let mut found =
-        each(seeds, |seed| Ok(Trial::lay(&cell, &run, seed)?.settles_within(0.0, 0.5)))?;
+        each(seeds, |seed| Ok(Trial::lay(&cell, &run, &scale(), seed)?.settles_within(0.0, 0.5)))?;
     Ok(median(&mut found))
 }
 

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::*;
 use crate::config::cell::{Cell, Purpose, RunPart};
+use crate::sim::trial::Trial;
 use crate::units::Mm;
 use crate::vision::Method;
 
@@ -43,9 +44,9 @@ fn the_papers_tables_come_out_as_in_an_independent_simulation() {
 #[test]
 fn the_same_seed_lays_the_same_bead() {
     let (cell, run) = cell();
-    let once = Trial::lay(&cell, &run, 7).unwrap();
-    assert_eq!(once, Trial::lay(&cell, &run, 7).unwrap());
-    assert_ne!(once.bead, Trial::lay(&cell, &run, 8).unwrap().bead);
+    let once = Trial::lay(&cell, &run, &scale(), 7).unwrap();
+    assert_eq!(once, Trial::lay(&cell, &run, &scale(), 7).unwrap());
+    assert_ne!(once.bead, Trial::lay(&cell, &run, &scale(), 8).unwrap().bead);
 }
 
 #[test]

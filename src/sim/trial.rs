@@ -1,15 +1,14 @@
-//! One layer on the fitted plant, and what became of the bead itself.
+//! One simulated layer, and what became of the bead itself.
 
 use crate::calib::Calibration;
 use crate::config::cell::{Cell, RunPart};
 use crate::control::{Event, RobotState, Step};
 use crate::runner::NoRecorder;
-use crate::sim::cell::{Sight, SimCell, SimError, Witness};
-use crate::sim::score::{AlongBead, Score, mean};
 use crate::time::Stamp;
 use crate::units::Mm;
 
-use super::MM_PER_PX;
+use super::cell::{Sight, SimCell, SimError, Witness};
+use super::score::{AlongBead, Score, mean};
 
 /// Places along the bead at which it is judged \[mm\].
 const EVERY_MM: f64 = 0.5;
@@ -29,18 +28,27 @@ pub struct Trial {
 
 impl Trial {
     /// Lays one layer of the cell's nominal width with a seed.
-    pub fn lay(cell: &Cell, run: &RunPart, seed: u64) -> Result<Self, SimError> {
-        Self::lay_told(cell, run, 1.0, seed)
+    pub fn lay(
+        cell: &Cell,
+        run: &RunPart,
+        calibration: &Calibration,
+        seed: u64,
+    ) -> Result<Self, SimError> {
+        Self::lay_told((cell, run), calibration, 1.0, seed)
     }
 
     /// The same by a controller that is told the camera's distance wrong by a
     /// factor.
-    pub fn lay_told(cell: &Cell, run: &RunPart, factor: f64, seed: u64) -> Result<Self, SimError> {
+    pub fn lay_told(
+        (cell, run): (&Cell, &RunPart),
+        calibration: &Calibration,
+        factor: f64,
+        seed: u64,
+    ) -> Result<Self, SimError> {
         let mut cell = cell.clone();
         cell.simulation.seed = seed + 1;
         let target_mm = run.control.target.nominal().get();
-        let scale = Calibration::Scale { mm_per_px: MM_PER_PX, sigma: None };
-        let mut sim = SimCell::told(&cell, run, factor, scale, NoRecorder)?;
+        let mut sim = SimCell::told(&cell, run, factor, calibration.clone(), NoRecorder)?;
         let mut watch = Watch { score: Score::new(target_mm), newest: None, begun: None };
         let _ = sim.layer(Mm::ZERO, &mut watch);
         let mut bead = Vec::new();

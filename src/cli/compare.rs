@@ -1,0 +1,139 @@
+//! `truebead compare`: several controllers on the same seeded disturbances.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Context;
+use clap::Args;
+
+use super::cell::LoadedCell;
+use super::{Voice, WrongArguments};
+use crate::config::cell::{Purpose, RunPart};
+use crate::offline::compare::Comparison;
+use crate::offline::{Progress, output};
+use crate::sim::compare::{Contender, Figures};
+use crate::units::Mm;
+
+/// Most controllers: as many as there are colours.
+const MOST: usize = 6;
+
+/// Lays the same simulated bead with several controllers and tells how well each does it.
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Example:
+  truebead compare cells/barjuei2022.toml cells/distance.toml --widths 44,42,40,38 --out compared
+
+Each cell is a controller: its [control], [camera], [robot] and [limits]. The bead, what
+disturbs it and the measurement's noise are those of the first cell, [bead] and
+[simulation], and the same for all; how late a width comes and how often the robot
+reports is each cell's own.
+
+Leaves compare.json and report.html, and prints the table. Errors are those of the bead
+itself; ± is 95 % confidence of the mean over seeds.
+
+Exit status: 0 compared, 2 a cell that cannot be simulated or wrong arguments.")]
+pub struct CompareArgs {
+    /// Cell files, one for each controller
+    #[arg(value_name = "SCENARIO.toml", required = true)]
+    scenarios: Vec<PathBuf>,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Seeds of every controller and width
+    #[arg(long, value_name = "N", default_value_t = 100,
+          value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    seeds: u64,
+    /// Widths that are asked for [mm]; the first cell's own where none is given
+    #[arg(long, value_name = "W,W…", value_delimiter = ',')]
+    widths: Vec<f64>,
+}
+
+/// Runs the command.
+pub fn run(args: &CompareArgs, voice: Voice) -> anyhow::Result<ExitCode> {
+    let contenders = contenders(args)?;
+    let widths = widths(args, &contenders)?;
+    output::make_folder(&args.out)?;
+    let total = args.seeds * (contenders.len() * widths.len()) as u64;
+    let mut progress = Progress::new("laying", "beads", Some(total), voice.quiet);
+    let mut done = 0;
+    let mut compared = Vec::new();
+    for width in widths {
+        let mut all: Vec<Figures> = Vec::new();
+        for who in &contenders {
+            all.push(Figures::lay(who, width, args.seeds, all.first())?);
+            done += args.seeds;
+            progress.set(done);
+        }
+        compared.push((width.get(), all));
+    }
+    progress.finish();
+    let controllers = contenders.into_iter().map(|who| who.name).collect();
+    let comparison = Comparison { controllers, seeds: args.seeds, widths: compared };
+    let json = serde_json::to_vec_pretty(&comparison.numbers()).context("compare.json")?;
+    output::write_whole(&args.out, "compare.json", &json)?;
+    output::write_whole(&args.out, "report.html", comparison.page().as_bytes())?;
+    say!("{}\n{}", comparison.plain(), args.out.join("report.html").display());
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The controllers on the plant of the first cell.
+fn contenders(args: &CompareArgs) -> anyhow::Result<Vec<Contender>> {
+    if args.scenarios.len() > MOST {
+        let what = format!("{} cells: {MOST} can be told apart", args.scenarios.len());
+        return Err(WrongArguments::new(what).into());
+    }
+    let mut contenders: Vec<Contender> = Vec::new();
+    for path in &args.scenarios {
+        let loaded = LoadedCell::read(path, Purpose::Run)?;
+        let run = run_part(&loaded)?;
+        let mut cell = loaded.cell;
+        if let Some(first) = contenders.first() {
+            let own = cell.simulation.clone();
+            cell.simulation = first.cell.simulation.clone();
+            (cell.simulation.latency, cell.simulation.report) = (own.latency, own.report);
+            cell.simulation.step = own.step;
+        }
+        let name = name(path, &contenders);
+        contenders.push(Contender { name, cell, run, calibration: loaded.calibration });
+    }
+    Ok(contenders)
+}
+
+/// What a run needs, of a cell without an extruder of its own.
+fn run_part(loaded: &LoadedCell) -> anyhow::Result<RunPart> {
+    let path = loaded.path.display();
+    let Some(run) = loaded.cell.run.clone() else {
+        let what = format!("{path}: it lacks tables that a simulation needs");
+        return Err(WrongArguments::new(what).into());
+    };
+    if run.extruder.is_some() {
+        let what = format!(
+            "{path}: found [extruder], expected a cell whose extruder goes its own way; \
+             `truebead simulate` lays a bead with both"
+        );
+        return Err(WrongArguments::new(what).into());
+    }
+    Ok(run)
+}
+
+/// The file's name without its ending; the whole path where another has it.
+fn name(path: &std::path::Path, others: &[Contender]) -> String {
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let stem = stem.unwrap_or_default();
+    let taken = others.iter().any(|other| other.name == stem);
+    if taken { path.display().to_string() } else { stem }
+}
+
+fn widths(args: &CompareArgs, contenders: &[Contender]) -> anyhow::Result<Vec<Mm>> {
+    if args.widths.is_empty() {
+        let own = contenders.first().map(|who| who.run.control.target.nominal());
+        return Ok(own.into_iter().collect());
+    }
+    let sound = |width: &f64| Mm::new(*width).ok().filter(|_| (0.1..=1000.0).contains(width));
+    let widths: Option<Vec<Mm>> = args.widths.iter().map(sound).collect();
+    widths.ok_or_else(|| {
+        let found: Vec<String> = args.widths.iter().map(f64::to_string).collect();
+        let what = format!("--widths: found {}, expected 0.1 to 1000 mm each", found.join(","));
+        WrongArguments::new(what).into()
+    })
+}

@@ -1,0 +1,186 @@
+//! Several controllers on the same plant with the same seeds.
+
+use rayon::prelude::*;
+
+use super::cell::SimError;
+use super::score::{AlongBead, mean, median};
+use super::trial::Trial;
+use crate::calib::Calibration;
+use crate::config::cell::{Cell, RunPart};
+use crate::control::target::Target;
+use crate::units::Mm;
+
+/// Way after control began from which errors count \[mm\].
+pub const JUDGED_AFTER_MM: f64 = 30.0;
+/// The same from which scatter is that of control alone \[mm\].
+pub const SCATTER_AFTER_MM: f64 = 700.0;
+/// Length of a piece of the bead over which errors are put together \[mm\].
+const PIECE_MM: f64 = 5.0;
+/// Standard deviations of a mean on either side that 95 of 100 lie within.
+const OF_95: f64 = 1.96;
+
+/// A controller with its cell; bead, simulated world and calibration are those
+/// of the plant that all have.
+#[derive(Debug, Clone)]
+pub struct Contender {
+    /// What it is called.
+    pub name: String,
+    /// Its cell on the common plant.
+    pub cell: Cell,
+    /// What the cell's run part says.
+    pub run: RunPart,
+    /// What a pixel means.
+    pub calibration: Calibration,
+}
+
+impl Contender {
+    /// The same with another width that is asked for.
+    fn asked(&self, width: Mm) -> RunPart {
+        let mut run = self.run.clone();
+        run.control.target = Target::constant(width);
+        run
+    }
+}
+
+/// A number over seeds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Its mean; none where it is infinite for a seed.
+    pub mean: Option<f64>,
+    /// Half the interval that holds the mean with 95 % confidence.
+    pub confidence: Option<f64>,
+    /// Its median; none where most seeds have none.
+    pub median: Option<f64>,
+}
+
+impl Estimate {
+    /// Of a number of each seed.
+    pub fn of(mut values: Vec<f64>) -> Self {
+        let finite = values.iter().all(|value| value.is_finite());
+        #[expect(clippy::cast_precision_loss, reason = "seeds are few")]
+        let count = values.len() as f64;
+        let middle = mean(values.iter().copied());
+        let variance = mean(values.iter().map(|value| (value - middle).powi(2)));
+        let spread = (variance / (count - 1.0).max(1.0)).sqrt();
+        let median = median(&mut values);
+        Self {
+            mean: finite.then_some(middle),
+            confidence: (finite && count > 1.0).then_some(OF_95 * spread),
+            median: median.is_finite().then_some(median),
+        }
+    }
+}
+
+/// What a controller came to at one width.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figures {
+    /// Mean size of the bead's error from 30 mm after control began \[mm\].
+    pub mean_error_mm: Estimate,
+    /// Its root mean square \[mm\].
+    pub rms_error_mm: Estimate,
+    /// Integral of its size over the path from where control began \[mm²\].
+    pub integral_mm2: Estimate,
+    /// Way after control began to within half a millimetre for good \[mm\].
+    pub settled_mm: Estimate,
+    /// Standard deviation of the width from 700 mm after control began \[mm\].
+    pub scatter_mm: Estimate,
+    /// Root mean square error over that of the first controller with the same
+    /// seed.
+    pub ratio: Estimate,
+    /// Root mean square error over all seeds, along the path.
+    pub course: Vec<AlongBead>,
+    /// Width of the bead of the first seed.
+    pub example: Vec<AlongBead>,
+    /// Root mean square error of each seed \[mm\].
+    rms_by_seed: Vec<f64>,
+}
+
+impl Figures {
+    /// Lays a width with seeds from 0 on, in parallel.
+    pub fn lay(
+        who: &Contender,
+        width: Mm,
+        seeds: u64,
+        first: Option<&Self>,
+    ) -> Result<Self, SimError> {
+        let run = who.asked(width);
+        let lay = |seed| Trial::lay(&who.cell, &run, &who.calibration, seed);
+        let trials: Vec<Trial> = (0..seeds).into_par_iter().map(lay).collect::<Result<_, _>>()?;
+        let of = |value: &dyn Fn(&Trial) -> f64| trials.iter().map(value).collect::<Vec<f64>>();
+        let judged = |trial: &Trial| trial.begun_mm + JUDGED_AFTER_MM;
+        let rms_by_seed = of(&|trial| trial.rms_error(judged(trial)));
+        let firsts = first.map_or(&rms_by_seed, |first| &first.rms_by_seed);
+        let ratios = rms_by_seed.iter().zip(firsts).map(|(ours, first)| ours / first).collect();
+        Ok(Self {
+            mean_error_mm: Estimate::of(of(&|trial| trial.mean_error(judged(trial)))),
+            rms_error_mm: Estimate::of(rms_by_seed.clone()),
+            integral_mm2: Estimate::of(of(&|trial| trial.error_integral(trial.begun_mm))),
+            settled_mm: Estimate::of(of(&|trial| trial.settles_within(trial.begun_mm, 0.5))),
+            scatter_mm: Estimate::of(of(&|trial| trial.scatter(trial.begun_mm + SCATTER_AFTER_MM))),
+            ratio: Estimate::of(ratios),
+            course: course(&trials, width.get()),
+            example: trials.into_iter().next().map(|trial| trial.bead).unwrap_or_default(),
+            rms_by_seed,
+        })
+    }
+}
+
+/// Root mean square error of all seeds, piece by piece of the path.
+fn course(trials: &[Trial], target_mm: f64) -> Vec<AlongBead> {
+    let mut pieces: Vec<(f64, f64)> = Vec::new();
+    for (at, width) in trials.iter().flat_map(|trial| &trial.bead) {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a path")]
+        let piece = (at / PIECE_MM).max(0.0) as usize;
+        if pieces.len() <= piece {
+            pieces.resize(piece + 1, (0.0, 0.0));
+        }
+        pieces[piece].0 += (width - target_mm).powi(2);
+        pieces[piece].1 += 1.0;
+    }
+    let middle = |number: usize| {
+        #[expect(clippy::cast_precision_loss, reason = "a path is not that long")]
+        let number = number as f64;
+        (number + 0.5) * PIECE_MM
+    };
+    let known = pieces.iter().enumerate().filter(|(_, (_, count))| *count > 0.0);
+    known.map(|(number, (sum, count))| (middle(number), (sum / count).sqrt())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::config::cell::Purpose;
+
+    fn contender(name: &str, text: &str) -> Contender {
+        let cell = Cell::parse(Path::new(name), text, Purpose::Run).unwrap();
+        let run = cell.run.clone().unwrap();
+        let calibration = crate::sim::barjuei2022::scale();
+        Contender { name: name.into(), cell, run, calibration }
+    }
+
+    #[test]
+    fn an_estimate_tells_mean_median_and_confidence() {
+        let estimate = Estimate::of(vec![1.0, 2.0, 3.0, 6.0]);
+        assert_eq!((estimate.mean, estimate.median), (Some(3.0), Some(2.5)));
+        // s² = 14/3, s/√4 = 1.0801.
+        assert!((estimate.confidence.unwrap() - 1.96 * (14.0_f64 / 3.0).sqrt() / 2.0).abs() < 1e-9);
+        let never = Estimate::of(vec![1.0, f64::INFINITY, 2.0]);
+        assert_eq!((never.mean, never.median), (None, Some(2.0)));
+        assert_eq!(Estimate::of(vec![f64::INFINITY; 3]).median, None);
+    }
+
+    #[test]
+    fn the_law_by_distance_beats_the_paper_on_every_seed() {
+        let paper = contender("paper", include_str!("../../cells/barjuei2022.toml"));
+        let ours = contender("ours", include_str!("../../cells/distance.toml"));
+        let width = Mm::constant(42.0);
+        let first = Figures::lay(&paper, width, 4, None).unwrap();
+        let second = Figures::lay(&ours, width, 4, Some(&first)).unwrap();
+        assert_eq!(first.ratio.mean, Some(1.0));
+        assert!(second.ratio.mean.unwrap() + second.ratio.confidence.unwrap() < 0.3);
+        assert!(second.settled_mm.median.unwrap() < first.settled_mm.median.unwrap_or(1e9));
+        assert_eq!(first, Figures::lay(&paper, width, 4, None).unwrap());
+    }
+}

@@ -1,0 +1,50 @@
+//! `truebead compare` as a user types it.
+
+#![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+mod common;
+
+use common::{cell, truebead};
+
+#[test]
+fn controllers_are_told_apart_at_every_width() {
+    let out = tempfile::tempdir().unwrap();
+    let done = truebead()
+        .args(["compare", &cell("barjuei2022.toml"), &cell("distance.toml")])
+        .args(["--widths", "42,40", "--seeds", "3", "--out"])
+        .arg(out.path())
+        .assert()
+        .success();
+    let said = String::from_utf8(done.get_output().stdout.clone()).unwrap();
+    assert!(said.contains("RMS error over that of the first"), "{said}");
+    let json = std::fs::read_to_string(out.path().join("compare.json")).unwrap();
+    let numbers: Vec<serde_json::Value> = serde_json::from_str(&json).unwrap();
+    assert_eq!(numbers.len(), 2 * 2 * 6);
+    let ratio = |controller: &str, width: f64| {
+        let found = numbers.iter().find(|number| {
+            number["controller"] == controller
+                && number["width_mm"] == width
+                && number["quantity"] == "RMS error over that of the first"
+        });
+        found.unwrap()["mean"].as_f64().unwrap()
+    };
+    for width in [42.0, 40.0] {
+        assert_eq!(ratio("barjuei2022", width), 1.0);
+        assert!(ratio("distance", width) < 0.35);
+    }
+    assert!(out.path().join("report.html").metadata().unwrap().len() > 10_000);
+}
+
+#[test]
+fn a_cell_with_an_extruder_of_its_own_and_widths_that_cannot_be_are_refused() {
+    let out = tempfile::tempdir().unwrap();
+    let refused = |args: &[&str]| {
+        let mut command = truebead();
+        let done = command.args(args).arg("--out").arg(out.path()).assert().code(2);
+        String::from_utf8(done.get_output().stderr.clone()).unwrap()
+    };
+    let said = refused(&["compare", &cell("extruder-screw.toml")]);
+    assert!(said.contains("found [extruder]"), "{said}");
+    let said = refused(&["compare", &cell("distance.toml"), "--widths", "42,-3"]);
+    assert!(said.contains("expected 0.1 to 1000 mm"), "{said}");
+}
