@@ -4,18 +4,21 @@
 
 mod common;
 
-use common::{cell, truebead};
+use common::{said, truebead};
+
+/// A cell that ships with the program.
+fn cell(name: &str) -> String {
+    format!("{}/cells/{name}", env!("CARGO_MANIFEST_DIR"))
+}
 
 #[test]
 fn controllers_are_told_apart_at_every_width() {
     let out = tempfile::tempdir().unwrap();
-    let done = truebead()
-        .args(["compare", &cell("barjuei2022.toml"), &cell("distance.toml")])
-        .args(["--widths", "42,40", "--seeds", "3", "--out"])
-        .arg(out.path())
-        .assert()
-        .success();
-    let said = String::from_utf8(done.get_output().stdout.clone()).unwrap();
+    let folder = out.path().to_str().unwrap();
+    let cells = [cell("barjuei2022.toml"), cell("distance.toml")];
+    let args = ["--widths", "42,40", "--seeds", "3", "--out", folder];
+    let mut command = truebead(&["compare", &cells[0], &cells[1]]);
+    let said = said(command.args(args), 0);
     assert!(said.contains("RMS error over that of the first"), "{said}");
     let json = std::fs::read_to_string(out.path().join("compare.json")).unwrap();
     let numbers: Vec<serde_json::Value> = serde_json::from_str(&json).unwrap();
@@ -38,11 +41,7 @@ fn controllers_are_told_apart_at_every_width() {
 #[test]
 fn a_cell_with_an_extruder_of_its_own_and_widths_that_cannot_be_are_refused() {
     let out = tempfile::tempdir().unwrap();
-    let refused = |args: &[&str]| {
-        let mut command = truebead();
-        let done = command.args(args).arg("--out").arg(out.path()).assert().code(2);
-        String::from_utf8(done.get_output().stderr.clone()).unwrap()
-    };
+    let refused = |args: &[&str]| said(truebead(args).arg("--out").arg(out.path()), 2);
     let said = refused(&["compare", &cell("extruder-screw.toml")]);
     assert!(said.contains("found [extruder]"), "{said}");
     let said = refused(&["compare", &cell("distance.toml"), "--widths", "42,-3"]);

@@ -11,6 +11,7 @@ use super::cell::{ExtruderSide, LoadedCell, beyond, steady};
 use crate::calib::Calibration;
 use crate::config::Cell;
 use crate::config::cell::{Purpose, RunPart, Source};
+use crate::config::control::WidthLaw;
 use crate::units::Mm;
 
 /// Validates a cell file and all it refers to.
@@ -53,6 +54,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
             let Some(run) = &loaded.cell.run else { return Ok(ExitCode::SUCCESS) };
             about_purposes(run);
             about_run(run);
+            about_law(&loaded, run);
             about_extruder(&loaded, side.as_ref())?;
         }
         Err(missing) => {
@@ -183,6 +185,24 @@ fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::R
         );
     }
     Ok(())
+}
+
+/// Tells what the width is held by, where it is held by distance.
+fn about_law(loaded: &LoadedCell, run: &RunPart) {
+    let WidthLaw::Distance(told) = run.control.law else { return };
+    let learnt = if told.learns { ", learnt as the bead is laid" } else { "" };
+    say!("  law          by distance, b = {}{learnt}", told.value);
+    let gauge = loaded.cell.gauge_length(&loaded.calibration);
+    say!(
+        "               gauge {:.1} mm long, {} ± {} behind the nozzle",
+        gauge.get(),
+        run.camera.offset,
+        run.camera.offset_sigma
+    );
+    if gauge > run.camera.offset * 0.5 {
+        say!("  WARNING      gauge.roi_px is more than half as long as offset_mm: a shorter one");
+        say!("               shows changes of the bead sooner");
+    }
 }
 
 fn about_run(run: &RunPart) {

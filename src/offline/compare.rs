@@ -1,5 +1,7 @@
 //! Controllers beside each other: a table, `compare.json` and a page.
 
+use std::fmt::Write as _;
+
 use maud::{Markup, html};
 use serde::Serialize;
 
@@ -117,18 +119,20 @@ impl Comparison {
     /// controller, a column for each width.
     pub fn plain(&self) -> String {
         let widest = self.controllers.iter().map(|name| name.chars().count()).max().unwrap_or(0);
+        // Writing to a string cannot fail.
         let mut text = format!("{:widest$}", "");
         for (width, _) in &self.widths {
-            text += &format!("  {:>16}", format!("{width} mm"));
+            let head = format!("{width} mm");
+            let _ = write!(text, "  {head:>16}");
         }
         for (at, (quantity, unit, how)) in QUANTITIES.iter().enumerate() {
             let unit = if *unit == "1" { String::new() } else { format!(" [{unit}]") };
-            text += &format!("\n{quantity}{unit}\n");
+            let _ = write!(text, "\n{quantity}{unit}\n");
             for (who, name) in self.controllers.iter().enumerate() {
-                text += &format!("{name:widest$}");
+                let _ = write!(text, "{name:widest$}");
                 for (_, all) in &self.widths {
                     let cell = all.get(who).map(|found| told(&estimates(found)[at], *how));
-                    text += &format!("  {:>16}", cell.unwrap_or_default());
+                    let _ = write!(text, "  {:>16}", cell.unwrap_or_default());
                 }
                 text.push('\n');
             }

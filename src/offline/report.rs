@@ -4,6 +4,7 @@ pub mod advice;
 pub mod area;
 pub mod axis;
 pub mod charts;
+mod distance;
 pub mod extruder;
 pub mod headline;
 pub mod histogram;
@@ -66,6 +67,7 @@ impl Report<'_> {
             (headline::tiles(self.summary))
             (sections::over_time(self))
             (sections::over_path(self))
+            (self.charts.distance.section(self.summary.distance.as_ref()))
             @if let Some(drive) = self.extruder {
                 (self.charts.extruder.section(drive, self.summary.extruder.as_ref()))
             }

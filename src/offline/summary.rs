@@ -1,6 +1,7 @@
 //! `summary.json`: what a run came to, in numbers.
 
 mod control;
+mod distance;
 mod extruder;
 mod follow;
 mod profile;
@@ -12,6 +13,8 @@ use serde::Serialize;
 
 pub use control::ControlSummary;
 use control::ControlTally;
+pub use distance::DistanceSummary;
+use distance::DistanceTally;
 pub use extruder::ExtruderSummary;
 use extruder::ExtruderTally;
 pub use follow::Follower;
@@ -58,6 +61,9 @@ pub struct Summary {
     /// What only a run with a controller has; its keys stand beside the others.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub control: Option<ControlSummary>,
+    /// What only a run has whose width is held by distance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distance: Option<DistanceSummary>,
     /// What only a run has whose extruder is commanded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub extruder: Option<ExtruderSummary>,
@@ -135,6 +141,7 @@ pub struct SummaryBuilder {
     first_s: Option<f64>,
     last_s: Option<f64>,
     control: Option<ControlTally>,
+    distance: DistanceTally,
     extruder: ExtruderTally,
 }
 
@@ -157,6 +164,7 @@ impl SummaryBuilder {
             first_s: None,
             last_s: None,
             control: with_control.then(ControlTally::default),
+            distance: DistanceTally::default(),
             extruder: ExtruderTally::default(),
         }
     }
@@ -199,6 +207,7 @@ impl SummaryBuilder {
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         self.moment(Some(now.secs()));
         self.extruder.step(now, event, step);
+        self.distance.step(step);
         if let Some(control) = &mut self.control {
             control.step(now, event, step);
         }
@@ -247,6 +256,7 @@ impl SummaryBuilder {
             duration_s: self.first_s.zip(self.last_s).map(|(first, last)| last - first),
             target_width_mm: self.target.map(Mm::get),
             control: self.control.as_ref().map(ControlTally::finish),
+            distance: self.distance.finish(),
             extruder: self.extruder.finish(),
         }
     }

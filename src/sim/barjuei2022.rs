@@ -9,12 +9,14 @@ mod stack;
 mod stand_off;
 #[cfg(test)]
 mod tests;
+mod tower;
 
 pub use contender::{Contender, Rates};
 pub use disturbed::{Disturbance, Wrong, step_settles, unrest, wrong};
 pub use layers::{LayerResult, lay, settles_unseen, with_frames};
 pub use stack::{Stack, stack};
 pub use stand_off::{StandOff, camera_above, stand_off};
+pub use tower::{Storey, tower};
 
 /// Scale of the paper's camera, section 4.3.1 \[mm/px\].
 pub const MM_PER_PX: f64 = 0.126_582;

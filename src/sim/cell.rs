@@ -204,6 +204,7 @@ impl<K: Recorder> SimCell<K> {
     /// witness has seen enough.
     pub fn layer(&mut self, z: Mm, witness: &mut impl Witness) -> LayerEnd {
         self.bead = Self::fresh_bead(&self.cell, self.layers);
+        self.camera.raise(self.cell.rise(Some(z)));
         self.bead_start = self.runner.robot_mut().begin(self.now, z).path_mm.get();
         self.laid_to = (0.0, self.run.robot.start_speed.get());
         self.started = false;

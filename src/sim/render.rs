@@ -41,6 +41,8 @@ const TEXTURE: u64 = 3;
 pub struct Renderer {
     calibration: Calibration,
     surface_height: Mm,
+    /// How much higher the bead lies than that of the first layer.
+    rise: Mm,
     gauge: Gauge,
     picture: Picture,
     size: (usize, usize),
@@ -105,7 +107,13 @@ impl Renderer {
         }
         let true_height = picture.true_surface_height_mm.and_then(|height| Mm::new(height).ok());
         let surface_height = true_height.unwrap_or(surface_height);
-        Ok(Self { calibration, surface_height, gauge, picture, size, seed })
+        let rise = Mm::ZERO;
+        Ok(Self { calibration, surface_height, rise, gauge, picture, size, seed })
+    }
+
+    /// The bead lies higher than that of the first layer from now on.
+    pub fn raise(&mut self, rise: Mm) {
+        self.rise = rise;
     }
 
     /// Columns and rows of the pictures \[px\].
@@ -149,11 +157,12 @@ impl Renderer {
     }
 
     fn view(&self, robot_z: Option<Mm>) -> Result<View, RenderError> {
-        let map = self.calibration.surface(self.surface_height, robot_z);
+        let height = self.surface_height + self.rise;
+        let map = self.calibration.surface(height, robot_z);
         let Picture { slant_deg, lateral_mm, .. } = self.picture;
         View::new(map, &self.gauge, slant_deg, lateral_mm)
             .map(|view| view.bent(Bend::new(&self.picture.bend)))
-            .ok_or(RenderError::OffSurface { height_mm: self.surface_height.get() })
+            .ok_or(RenderError::OffSurface { height_mm: height.get() })
     }
 
     /// Pixels along and across the gauge's axis.

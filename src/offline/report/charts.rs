@@ -1,6 +1,7 @@
 //! What the plots are drawn from, gathered one fact at a time in bounded
 //! memory.
 
+use super::distance::DistanceCharts;
 use super::extruder::ExtruderCharts;
 use super::series::Series;
 use super::strip::{Mark, Strip};
@@ -67,6 +68,8 @@ pub struct Charts {
     pub states: Strip,
     /// Limits that acted.
     pub limits: Strip,
+    /// The law by distance.
+    pub distance: DistanceCharts,
     /// The extruder side.
     pub extruder: ExtruderCharts,
     follower: Follower,
@@ -103,6 +106,7 @@ impl Charts {
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         self.timed.get_or_insert(true);
         self.extruder.step(now, event, step);
+        self.distance.step(step);
         let time = now.secs();
         let before = self.follower.setpoint();
         let _ = self.follower.step(now, event, step);

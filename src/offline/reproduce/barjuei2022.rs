@@ -20,7 +20,9 @@ const CELL: &str = include_str!("../../../cells/barjuei2022.toml");
 /// Sideways error of the second of two stacked layers \[mm\].
 const ASIDE_MM: f64 = 0.8;
 /// What progress is told of.
-pub const EXPERIMENTS: u64 = 10 + ahead::EXPERIMENTS;
+pub const EXPERIMENTS: u64 = 11 + ahead::EXPERIMENTS;
+/// Layers one upon the other.
+const STOREYS: u32 = 20;
 const SEEDS: u64 = 40;
 const FRAME_SEEDS: u64 = 3;
 
@@ -67,6 +69,8 @@ pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, Reprod
     });
     progress.advance();
     work.stack()?;
+    progress.advance();
+    work.tower()?;
     progress.advance();
     let about = format!(
         "Medians over {seeds} seeds, {frame_seeds} where every frame is rendered. Errors are \
@@ -154,6 +158,23 @@ impl Experiments {
                 Some(stack.widths_mm[which] - stack.true_widths_mm[which])
             };
             self.rows.push(&case, (name, "mm"), [None, error(&theirs), error(&ours)]);
+        }
+        Ok(())
+    }
+
+    /// The worst of many layers, measured and laid.
+    fn tower(&mut self) -> Result<(), ReproduceError> {
+        let storeys = experiments::tower(&self.cell, &self.run, STOREYS)?;
+        let worst = |of: fn(&experiments::Storey) -> f64| {
+            storeys.iter().map(|storey| of(storey).abs()).fold(0.0, f64::max)
+        };
+        let case = format!("{STOREYS} layers of 20 mm and 42 mm, frames rendered, by distance");
+        let pairs = [
+            ("mean error of the measured width, worst layer", worst(|s| s.measured_error_mm)),
+            ("mean error of the bead, worst layer", worst(|s| s.laid_error_mm)),
+        ];
+        for (quantity, found) in pairs {
+            self.rows.push(&case, (quantity, "mm"), [None, None, Some(found)]);
         }
         Ok(())
     }

@@ -56,8 +56,9 @@ pub fn stack(cell: &Cell, run: &RunPart, aside_mm: f64) -> Result<Stack, SimErro
     })
 }
 
-/// The same camera, with its scale at the top of the first layer.
-fn raised_camera(layer_mm: f64) -> Calibration {
+/// The camera that looks straight down, with its scale at the top of the first
+/// layer.
+pub(super) fn raised_camera(layer_mm: f64) -> Calibration {
     let mut calibration = camera_above();
     if let Calibration::Full { bed, .. } = &mut calibration {
         let up = Vector3::new(0.0, 0.0, STAND_OFF_MM + layer_mm);

@@ -179,3 +179,17 @@ fn by_distance_what_is_told_wrong_and_widths_that_are_wrong_are_borne() {
         }
     }
 }
+
+#[test]
+fn twenty_layers_are_measured_alike_at_every_height() {
+    let (cell, run) = cell();
+    let storeys = tower(&cell, &run, 20).unwrap();
+    assert_eq!(storeys.len(), 20);
+    for storey in &storeys {
+        assert!(storey.widths > 100, "{storey:?}");
+        assert!(storey.measured_error_mm.abs() < 0.05, "{storey:?}");
+        assert!(storey.laid_error_mm.abs() < 0.05, "{storey:?}");
+    }
+    // The first layer teaches the bead; those above begin with what it taught.
+    assert!(storeys[1..].iter().all(|storey| storey.laid_error_mm.abs() < 0.02), "{storeys:?}");
+}

@@ -66,6 +66,8 @@ pub struct SimCamera {
     rides: bool,
     calibration: Calibration,
     surface_height: Mm,
+    /// How much higher the bead lies than that of the first layer.
+    rise: Mm,
     middle: ImagePoint,
     across: Vector2<f64>,
     renderer: Renderer,
@@ -94,6 +96,7 @@ impl SimCamera {
             rides: cell.mount != Some(Mount::Fixed),
             calibration,
             surface_height: cell.surface_height,
+            rise: Mm::ZERO,
             middle: gauge_middle(&cell.gauge.roi),
             across: match cell.gauge.axis {
                 Axis::Vertical => Vector2::x(),
@@ -102,6 +105,12 @@ impl SimCamera {
             renderer,
             measurer: Measurer::new(cell.gauge, cell.white),
         })
+    }
+
+    /// The bead lies higher than that of the first layer from now on.
+    pub fn raise(&mut self, rise: Mm) {
+        self.rise = rise;
+        self.renderer.raise(rise);
     }
 
     /// The edges behind the last measured frame.
@@ -114,7 +123,7 @@ impl SimCamera {
         let seq = self.seq;
         self.seq += 1;
         let z = self.rides.then_some(z);
-        let surface = self.calibration.surface(self.surface_height, z);
+        let surface = self.calibration.surface(self.surface_height + self.rise, z);
         match self.level {
             Level::Widths => {
                 let outcome = self.width(seq, under_mm, bead, &surface);
