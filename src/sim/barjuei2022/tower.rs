@@ -16,7 +16,7 @@ use crate::vision::Method;
 const LAYER: Mm = Mm::constant(20.0);
 /// Length of a layer, and of its start.
 const PATH: Mm = Mm::constant(1200.0);
-const START: Mm = Mm::constant(40.0);
+const START: Mm = Mm::constant(200.0);
 /// Width that is asked for.
 const WIDTH: Mm = Mm::constant(42.0);
 
