@@ -10,6 +10,7 @@ pub mod headline;
 pub mod histogram;
 pub mod legend;
 pub mod palette;
+pub mod pauses;
 pub mod plot;
 pub mod sections;
 pub mod series;

@@ -102,6 +102,9 @@ pub enum ReproduceError {
     /// A table of fits cannot be made.
     #[error(transparent)]
     FitTable(#[from] FitTableError),
+    /// Starts and stops cannot be told or timed.
+    #[error(transparent)]
+    StartStop(#[from] crate::sim::start_stop::experiment::ExperimentError),
     /// A model cannot be.
     #[error(transparent)]
     Model(#[from] ModelError),

@@ -9,10 +9,11 @@
 
 mod bead;
 mod dwell;
+pub mod experiment;
 mod melt;
 mod recording;
 
-pub use bead::{Bench, Score, Strategy};
+pub use bead::{Bench, Moment, Score, Strategy, WATCHED_S, Watched};
 pub use dwell::{Dwell, tune};
 pub use melt::{Machine, Melt};
 pub use recording::{Recording, record};

@@ -1,6 +1,7 @@
 //! The bead characterisation thesis beside its tables 3 and 4.
 
 mod draw;
+mod start_stop;
 
 use maud::{Markup, html};
 
@@ -16,10 +17,12 @@ use crate::sim::bcs_thesis::on_off::{
 };
 
 /// What progress is told of.
-pub const EXPERIMENTS: u64 = 6;
+pub const EXPERIMENTS: u64 = 7;
 const SEEDS: u64 = 10;
 /// Seeds of the table of fits.
 const FIT_SEEDS: u64 = 6;
+/// Seeds of the starts and stops.
+const START_SEEDS: u64 = 20;
 /// Fits beside the bounds of accuracy.
 const TRIALS: u64 = 100;
 /// Seeds of each distance of the camera.
@@ -62,6 +65,8 @@ pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, Reprod
         drawing: draw::exact(&exact),
     });
     sections.push(sensing(seeds, &mut rows)?);
+    progress.advance();
+    sections.push(start_stop::section(effort.seeds.unwrap_or(START_SEEDS), &mut rows)?);
     progress.advance();
     accuracy_bounds(&mut rows)?;
     progress.advance();

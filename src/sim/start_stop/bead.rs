@@ -65,6 +65,29 @@ pub struct Bench {
     pub robot_s: f64,
 }
 
+/// A moment of a start or a stop that is watched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// Since the pump was told \[s\].
+    pub since_s: f64,
+    /// What comes out of the nozzle \[mm³/s\].
+    pub flow_mm3_per_s: f64,
+    /// What the robot's speed takes \[mm³/s\].
+    pub wanted_mm3_per_s: f64,
+}
+
+/// A stop and the start after it, from when the pump was told.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Watched {
+    /// The stop.
+    pub stop: Vec<Moment>,
+    /// The start.
+    pub start: Vec<Moment>,
+}
+
+/// A stop or a start is watched for so long \[s\].
+pub const WATCHED_S: f64 = 4.0;
+
 /// Where a pause and the beads beside it have come to.
 struct Run<'a, S> {
     bench: &'a Bench,
@@ -72,6 +95,15 @@ struct Run<'a, S> {
     melt: Melt,
     speed_share: f64,
     score: Score,
+    /// What the pump was told last, and when.
+    told: Told,
+    watched: Watched,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Told {
+    Stop { at_s: f64 },
+    Run { at_s: f64 },
 }
 
 impl Bench {
@@ -84,21 +116,50 @@ impl Bench {
         strategy: &S,
         idle_s: &[f64],
     ) -> Vec<Score> {
-        let melt = Melt::flowing(machine, seed);
-        let score = Score::default();
-        let mut run = Run { bench: self, strategy, melt, speed_share: 1.0, score };
+        let mut run = self.run(machine, seed, strategy);
         let one = |idle_s: &f64| {
             run.score = Score::default();
-            let stopped_s = run.finish();
-            run.stand_until(run.melt.now_s() + idle_s);
-            run.begin(stopped_s);
+            run.pause(*idle_s);
             run.score
         };
         idle_s.iter().map(one).collect()
     }
+
+    /// The end of a bead, a pause \[s\] and the start after it, to be looked at.
+    pub fn watch<S: Strategy>(
+        &self,
+        machine: Machine,
+        seed: u64,
+        strategy: &S,
+        idle_s: f64,
+    ) -> Watched {
+        let mut run = self.run(machine, seed, strategy);
+        run.pause(idle_s);
+        run.watched
+    }
+
+    fn run<'a, S>(&'a self, machine: Machine, seed: u64, strategy: &'a S) -> Run<'a, S> {
+        Run {
+            bench: self,
+            strategy,
+            melt: Melt::flowing(machine, seed),
+            speed_share: 1.0,
+            score: Score::default(),
+            told: Told::Run { at_s: f64::NEG_INFINITY },
+            watched: Watched::default(),
+        }
+    }
 }
 
 impl<S: Strategy> Run<'_, S> {
+    /// The end of a bead, a pause from then on, and the bead after it.
+    fn pause(&mut self, idle_s: f64) {
+        self.watched = Watched::default();
+        let stopped_s = self.finish();
+        self.stand_until(self.melt.now_s() + idle_s);
+        self.begin(stopped_s);
+    }
+
     /// Goes on by one step with the robot told a share of its speed; returns the
     /// way that it made \[mm\].
     fn step(&mut self, told_share: f64) -> f64 {
@@ -112,7 +173,19 @@ impl<S: Strategy> Run<'_, S> {
         let wanted_mm3 = self.bench.laid.flow.get() * self.speed_share * dt_s;
         self.score.void_mm3 += (wanted_mm3 - came_mm3).max(0.0);
         self.score.drool_mm3 += (came_mm3 - wanted_mm3).max(0.0);
+        self.note(came_mm3 / dt_s, wanted_mm3 / dt_s);
         self.bench.laid.speed.get() * self.speed_share * dt_s
+    }
+
+    fn note(&mut self, flow_mm3_per_s: f64, wanted_mm3_per_s: f64) {
+        let (at_s, kept) = match self.told {
+            Told::Stop { at_s } => (at_s, &mut self.watched.stop),
+            Told::Run { at_s } => (at_s, &mut self.watched.start),
+        };
+        let since_s = self.melt.now_s() - at_s;
+        if since_s <= WATCHED_S {
+            kept.push(Moment { since_s, flow_mm3_per_s, wanted_mm3_per_s });
+        }
     }
 
     /// Lays the last part of a bead; returns when the pump was told to stop
@@ -120,6 +193,7 @@ impl<S: Strategy> Run<'_, S> {
     fn finish(&mut self) -> f64 {
         let stopped_s = self.melt.now_s();
         self.melt.command(0.0);
+        self.told = Told::Stop { at_s: stopped_s };
         let (mut rest_mm, share) = self.strategy.ends();
         while rest_mm > 0.0 {
             let since = Span::from_secs(self.melt.now_s() - stopped_s);
@@ -140,6 +214,7 @@ impl<S: Strategy> Run<'_, S> {
         let flow = self.bench.laid.flow;
         let pause = Pause { idle: Span::from_secs(told_s - stopped_s), before: flow };
         self.melt.command(flow.get());
+        self.told = Told::Run { at_s: told_s };
         let (waits_s, share) = self.strategy.begins(&pause);
         self.stand_until(told_s + waits_s);
         let (end_mm, _) = self.strategy.ends();

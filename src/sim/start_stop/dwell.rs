@@ -1,5 +1,7 @@
 //! Fixed dwell times, as printers have them, and the best of them.
 
+use rayon::prelude::*;
+
 use super::bead::{Bench, Score, Strategy};
 use super::melt::Machine;
 use crate::extruder::start_stop::Pause;
@@ -40,7 +42,9 @@ const ROUNDS: u32 = 2;
 pub fn tune(bench: &Bench, machine: Machine, idle_s: &[f64], seeds: std::ops::Range<u64>) -> Dwell {
     let cost = |dwell: &Dwell| -> f64 {
         let of = |seed| bench.lay(machine, seed, dwell, idle_s);
-        seeds.clone().flat_map(of).map(|score: Score| score.sum_mm3()).sum()
+        // Collected, so that the sum does not hang on which seed ends first.
+        let scores: Vec<Vec<Score>> = seeds.clone().into_par_iter().map(of).collect();
+        scores.iter().flatten().map(Score::sum_mm3).sum()
     };
     let speed_mm_per_s = bench.laid.speed.get();
     let mut best = Dwell { start_s: 1.0, stop_s: 0.3, speed_mm_per_s };

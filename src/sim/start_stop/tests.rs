@@ -2,38 +2,21 @@
 
 use std::sync::LazyLock;
 
+use super::experiment::bench;
 use super::*;
-use crate::extruder::start_stop::{Laid, StartStop, Timing};
-use crate::identify::start_stop::{StartStopFit, fit};
-use crate::time::Span;
-use crate::units::{Mm3PerS, MmPerS};
-
-/// A robot that may slow down to that share; 10 mm² at 40 mm/s.
-fn bench(least_share: f64) -> Bench {
-    let robot_lag = Span::from_millis(30);
-    let (flow, speed) = (Mm3PerS::constant(400.0), MmPerS::constant(40.0));
-    Bench { laid: Laid { flow, speed, least_share, robot_lag }, bead_mm: 120.0, robot_s: 0.03 }
-}
+use crate::extruder::start_stop::{StartStop, Timing};
+use crate::identify::start_stop::StartStopFit;
 
 /// A machine from which nothing random comes.
 const STILL: Machine = Machine { void_scatter: 0.0, wander: (0.0, 0.15), ..Machine::USUAL };
 
-/// What is found of a recording of 12 starts and stops.
 fn fitted(machine: Machine, seed: u64) -> StartStopFit {
-    let plan = Recording {
-        idle_s: vec![2.0, 60.0, 5.0, 240.0, 1.0, 20.0, 10.0, 120.0, 3.0, 35.0, 0.5, 400.0],
-        runs_s: 6.0,
-        mm3_per_s_per_rpm: 10.0,
-        step_s: 0.02,
-        sensor_mm3_per_s: 8.0,
-    };
-    let [command, flow] = record(machine, seed, &plan);
-    fit(&command, &flow).unwrap()
+    experiment::fitted(machine, seed).unwrap()
 }
 
 /// What is found of as many recordings as there are seeds.
 static FOUND: LazyLock<Vec<StartStopFit>> =
-    LazyLock::new(|| (0..SEEDS).map(|seed| fitted(Machine::USUAL, RECORDED + seed)).collect());
+    LazyLock::new(|| (0..SEEDS).map(|seed| fitted(Machine::USUAL, seed)).collect());
 
 /// All pauses and seeds together, a seed's mean.
 fn mean<S: Strategy>(bench: &Bench, machine: Machine, of: impl Fn(u64) -> S) -> Score {
@@ -44,8 +27,6 @@ fn mean<S: Strategy>(bench: &Bench, machine: Machine, of: impl Fn(u64) -> S) -> 
 }
 
 const SEEDS: u64 = 20;
-/// Seeds of the recordings, which have nothing to do with those of the beads.
-const RECORDED: u64 = 1000;
 
 #[test]
 fn starts_and_stops_that_are_foretold_lose_a_fifth_of_what_the_best_fixed_dwell_times_lose() {
@@ -89,7 +70,7 @@ fn a_machine_that_is_slower_to_start_and_drools_longer_gains_as_well() {
         ..Machine::USUAL
     };
     let (keeps, follows) = (bench(1.0), bench(0.05));
-    let timing = |seed| Timing::new(fitted(machine, RECORDED + seed).parameters, follows.laid);
+    let timing = |seed| Timing::new(fitted(machine, seed).parameters, follows.laid);
     let best = tune(&keeps, machine, &IDLE_S, 0..2);
     let sum = |scores: Vec<Score>| scores.into_iter().fold(Score::default(), Score::and).sum_mm3();
     let (mut fixed, mut ours) = (0.0, 0.0);
