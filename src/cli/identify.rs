@@ -7,24 +7,23 @@ mod keep;
 mod list;
 mod noise;
 mod options;
+mod request;
 mod source;
+mod starts;
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
 
-use self::bead::{Bead, LAID_FLOW};
+use self::bead::Bead;
 use self::options::{Columns, parse_dead_time, parse_forms, parse_hampel, parse_smooth};
-use super::WrongArguments;
 use super::outcome::free_folder;
-use crate::identify::experiment::Experiment;
 use crate::identify::file::{Setting, to_toml};
-use crate::identify::fit::{DeadTime, Settings, Structure};
+use crate::identify::fit::{DeadTime, Structure};
 use crate::identify::hampel::Hampel;
-use crate::identify::quantity::Quantity;
 use crate::identify::savgol::SavGol;
-use crate::offline::identify::{Logs, Study, page, study, text, to_json};
+use crate::offline::identify::{Study, page, study, text, to_json};
 use crate::offline::output::{make_folder, write_whole};
 
 /// Dead times are looked for up to this share of the record…
@@ -43,6 +42,7 @@ Examples:
       --validate example/other.csv --material PLA --nozzle-mm 0.4 --temperature-c 210 \\
       --library models
   truebead identify standing.csv --noise nozzle_mpa
+  truebead identify example/starts.csv --input screw_rpm --output flow_mm3_per_s --starts
 
   truebead simulate cells/extruder-excite.toml --record --out excite
   truebead identify excite/recording.mcap
@@ -112,9 +112,9 @@ pub struct IdentifyArgs {
     /// Temperature of the material that it holds for [°C]
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
     temperature_c: Option<f64>,
-    /// Folder for model.toml, report.html and identify.json; one that holds a model
-    /// already is refused
-    /// [default: model, or the first of model-2, model-3 … that is free]
+    /// Folder for model.toml, report.html and identify.json, or for starts.toml and
+    /// report.html; one that holds such a file already is refused
+    /// [default: model, or the first of model-2, model-3 … that is free; starts likewise]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Add the model to this folder as well, where cells look it up by material, nozzle
@@ -131,6 +131,14 @@ pub struct IdentifyArgs {
     /// of [extruder.pressure], instead of a model
     #[arg(long, value_name = "COLUMN", conflicts_with_all = ["input", "output", "library", "out", "validate", "hampel", "smooth", "model"])]
     noise: Option<String>,
+    /// Tell from a table of starts and stops how late the first flow comes by the time that
+    /// the pump stood, and what drools after a stop, instead of a model; the output is a flow
+    #[arg(long, conflicts_with_all = [
+        "noise", "library", "validate", "validate_share", "hampel", "smooth", "model",
+        "dead_time_s", "from_rest", "max_gap_s", "position", "measured_at_offset_mm", "area",
+        "width", "speed", "layer_height_mm"
+    ])]
+    starts: bool,
     /// Write logs of a simulated extruder to this folder, to try it with; a folder that
     /// holds them already is refused
     #[arg(long, value_name = "DIR", exclusive = true)]
@@ -151,6 +159,9 @@ pub fn run(args: &IdentifyArgs) -> Result<()> {
     if let Some(folder) = &args.example {
         return example::write(folder);
     }
+    if args.starts {
+        return starts::write(args);
+    }
     if let (Some(data), Some(column)) = (&args.data, &args.noise) {
         return noise::write(data, column, &args.columns, &args.bead);
     }
@@ -159,7 +170,7 @@ pub fn run(args: &IdentifyArgs) -> Result<()> {
         return list::write(data, &args.columns, &args.bead);
     }
     let folder = args.out.clone().unwrap_or_else(|| free_folder("model"));
-    keep::refuse_taken(&folder)?;
+    keep::refuse_taken(&folder, keep::MODEL)?;
     let (logs, doubts) = args.logs()?;
     let source = logs.source.clone();
     let forms = args.forms(&logs.estimation);
@@ -191,107 +202,4 @@ fn write(found: &Study, setting: Setting, folder: &Path) -> Result<String> {
     // again.
     write_whole(folder, keep::MODEL, model.as_bytes())?;
     Ok(model)
-}
-
-fn validates_with_itself(other: &Path) -> anyhow::Error {
-    let what = format!(
-        "--validate {}: these are the data that the model is fitted to, and a model foretells those \
-         whatever it is worth; name another log, or leave --validate out: the last part of the data \
-         is kept for it then",
-        other.display()
-    );
-    WrongArguments::new(what).into()
-}
-
-impl IdentifyArgs {
-    fn setting(&self) -> Result<Setting, WrongArguments> {
-        let told = [
-            ("--nozzle-mm", self.nozzle_mm, 0.01..=1e3, "0.01 to 1000 mm"),
-            ("--temperature-c", self.temperature_c, -100.0..=2000.0, "-100 to 2000 °C"),
-        ];
-        for (name, value, range, expected) in told {
-            if let Some(value) = value.filter(|value| !range.contains(value)) {
-                return Err(WrongArguments::new(format!("{name} {value}: expected {expected}")));
-            }
-        }
-        if self.material.as_ref().is_some_and(|name| name.trim().is_empty()) {
-            return Err(WrongArguments::new("--material: expected a name"));
-        }
-        Ok(Setting {
-            material: self.material.clone(),
-            nozzle_mm: self.nozzle_mm,
-            temperature_c: self.temperature_c,
-        })
-    }
-
-    /// The output's name where it is made of other columns.
-    fn made(&self) -> Option<&'static str> {
-        self.bead.makes_flow().then_some(LAID_FLOW)
-    }
-
-    fn asks_for_columns(&self) -> bool {
-        self.columns.input.is_none() && self.columns.output.is_none() && self.made().is_none()
-    }
-
-    /// The data, and what is odd about their units.
-    fn logs(&self) -> Result<(Logs, Vec<String>)> {
-        let output = self.columns.output.as_deref().or(self.made());
-        let (Some(path), Some(input), Some(output)) = (&self.data, &self.columns.input, output)
-        else {
-            let what = "needs both --input and --output (or --area or --width with --speed); \
-                        without either it lists the columns";
-            return Err(WrongArguments::new(what).into());
-        };
-        if input == output {
-            let what = format!(
-                "--input and --output are both {input}: a model tells the one from the other; name \
-                 what the extruder is told, and what comes of it"
-            );
-            return Err(WrongArguments::new(what).into());
-        }
-        let filters = data::Filters { hampel: self.hampel, smooth: self.smooth };
-        let request = data::Request { columns: &self.columns, bead: &self.bead, filters };
-        let read = |path| data::read(path, &request);
-        let (log, mut doubts) = read(path)?;
-        let source = path.display().to_string();
-        let share = self.validate_share.unwrap_or(VALIDATE_SHARE);
-        if !(0.0..=0.9).contains(&share) {
-            let what = format!("--validate-share {share}: expected 0 to 0.9");
-            return Err(WrongArguments::new(what).into());
-        }
-        let (estimation, validation) = match &self.validate {
-            Some(other) => {
-                let (rest, more) = read(other)?;
-                if (&rest.input, &rest.output) == (&log.input, &log.output) {
-                    return Err(validates_with_itself(other));
-                }
-                doubts.extend(
-                    more.into_iter().filter(|doubt| !doubts.contains(doubt)).collect::<Vec<_>>(),
-                );
-                (log, Some((rest, other.display().to_string())))
-            }
-            None if share > 0.0 => {
-                let (first, rest) = log.split(share).with_context(|| source.clone())?;
-                (first, Some((rest, source.clone())))
-            }
-            None => (log, None),
-        };
-        let quantity =
-            |column: &str| -> Result<Quantity, WrongArguments> { self.columns.quantity(column) };
-        let (input, output) = (quantity(input)?, quantity(output)?);
-        let from_rest = self.from_rest;
-        Ok((Logs { input, output, source, estimation, validation, from_rest }, doubts))
-    }
-
-    fn forms(&self, data: &Experiment) -> Vec<Settings> {
-        let most_s = (DEAD_TIME_SHARE * data.duration_s()).min(DEAD_TIME_S);
-        let dead_time = self.dead_time_s.0.unwrap_or(DeadTime::Estimated { least_s: 0.0, most_s });
-        let mut forms: Vec<Structure> = Vec::new();
-        for form in self.model.iter().flat_map(|forms| &forms.0) {
-            if !forms.contains(form) {
-                forms.push(*form);
-            }
-        }
-        forms.into_iter().map(|form| Settings::new(form, dead_time)).collect()
-    }
 }

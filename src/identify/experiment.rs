@@ -182,7 +182,8 @@ impl Experiment {
     }
 }
 
-fn check_time(time_s: &[f64], rules: &Rules) -> Result<(), ExperimentError> {
+/// Fails where time does not run on, or where no log has such steps.
+pub fn check_time(time_s: &[f64], rules: &Rules) -> Result<(), ExperimentError> {
     let falls = time_s.windows(2).position(|pair| pair[1] <= pair[0]);
     if let Some((at, pair)) = falls.and_then(|k| Some((k + 1, time_s.get(k..k + 2)?))) {
         return Err(ExperimentError::Order { at, before_s: pair[0], time_s: pair[1] });

@@ -8,6 +8,7 @@ use crate::identify::quantity::{Quantity, Unit};
 use crate::model::TransferFunction;
 
 pub use self::write::to_toml;
+pub(super) use self::write::{number, put, put_setting, row};
 
 /// Most coefficients of a numerator or a denominator.
 pub const MOST_COEFFICIENTS: usize = 8;
@@ -101,11 +102,7 @@ fn read_root(root: &Table<'_>) -> Option<ModelFile> {
     }
     let version = root.optional_integer("version", 1..=1);
     let kind = root.text("kind").map(str::to_owned);
-    let setting = Setting {
-        material: root.optional_text("material").map(str::to_owned),
-        nozzle_mm: root.optional_number("nozzle_mm", NOZZLE_MM),
-        temperature_c: root.optional_number("temperature_c", TEMPERATURE_C),
-    };
+    let setting = read_setting(root);
     let input = root.required_table("input").and_then(|table| read_input(&table));
     let output = root.required_table("output").and_then(|table| read_side(&table));
     let transfer = root.required_table("transfer").and_then(|table| read_transfer(&table));
@@ -131,6 +128,15 @@ fn read_root(root: &Table<'_>) -> Option<ModelFile> {
             None => None,
         },
     })
+}
+
+/// What a file holds for, as far as it tells.
+pub(super) fn read_setting(root: &Table<'_>) -> Setting {
+    Setting {
+        material: root.optional_text("material").map(str::to_owned),
+        nozzle_mm: root.optional_number("nozzle_mm", NOZZLE_MM),
+        temperature_c: root.optional_number("temperature_c", TEMPERATURE_C),
+    }
 }
 
 /// A quantity, and its value in the operating point.

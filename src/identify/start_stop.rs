@@ -15,6 +15,7 @@
 mod episodes;
 mod error;
 mod fall;
+pub mod file;
 mod least;
 mod rise;
 mod void;
@@ -59,6 +60,8 @@ pub struct StartStopFit {
     pub parameters: StartStop,
     /// Their standard errors, each in its own unit.
     pub sigma: StartStop,
+    /// Runs of the pump, with those that tell nothing.
+    pub runs: usize,
     /// Starts after a pause that is known.
     pub starts: Vec<SeenStart>,
     /// Stops.
@@ -83,6 +86,7 @@ pub fn fit(command: &Series, flow: &Series) -> Result<StartStopFit, StartStopFit
     Ok(StartStopFit {
         parameters,
         sigma,
+        runs: episodes.runs,
         starts: starts.collect(),
         stops: fall.stops,
         delay_scatter_s: void.scatter_s,

@@ -5,6 +5,7 @@ mod curves;
 mod doubts;
 mod json;
 mod page;
+pub mod starts;
 mod table;
 
 use crate::identify::ahead::{Ahead, ahead};

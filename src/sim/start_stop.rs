@@ -16,7 +16,7 @@ mod recording;
 pub use bead::{Bench, Moment, Score, Strategy, WATCHED_S, Watched};
 pub use dwell::{Dwell, tune};
 pub use melt::{Machine, Melt};
-pub use recording::{Recording, record};
+pub use recording::{Recording, example, record, to_csv};
 
 /// Pauses that starts are judged after \[s\].
 pub const IDLE_S: [f64; 7] = [0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0];

@@ -155,7 +155,8 @@ fn of_recording(
     Ok((taken, found.notes.iter().cloned().chain(more).collect()))
 }
 
-fn check_told(columns: &Columns, known: &[String], name: &str) -> Result<(), WrongArguments> {
+/// Refuses a unit that is told of a column which is not there.
+pub fn check_told(columns: &Columns, known: &[String], name: &str) -> Result<(), WrongArguments> {
     match columns.stray(known) {
         None => Ok(()),
         Some(stray) => {
@@ -167,7 +168,7 @@ fn check_told(columns: &Columns, known: &[String], name: &str) -> Result<(), Wro
 }
 
 /// The line in the file beside the number of the sample.
-fn at_line(table: &Table, first: usize, name: &str, error: ExperimentError) -> anyhow::Error {
+pub fn at_line(table: &Table, first: usize, name: &str, error: ExperimentError) -> anyhow::Error {
     let sample = match &error {
         ExperimentError::Order { at, .. } | ExperimentError::Outlier { at, .. } => Some(*at),
         ExperimentError::Gap { gap, .. } => Some(gap.after),

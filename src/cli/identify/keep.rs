@@ -15,9 +15,12 @@ use crate::offline::output::{make_folder, write_whole};
 /// What a model is called in its own folder.
 pub const MODEL: &str = "model.toml";
 
-/// Refuses a folder that holds a model already.
-pub fn refuse_taken(folder: &Path) -> Result<(), WrongArguments> {
-    refuse_replacing(&folder.join(MODEL), "folder")
+/// What starts and stops are called in their own folder.
+pub const STARTS: &str = "starts.toml";
+
+/// Refuses a folder that holds a file of this name already.
+pub fn refuse_taken(folder: &Path, name: &str) -> Result<(), WrongArguments> {
+    refuse_replacing(&folder.join(name), "folder")
 }
 
 /// Adds the text of a model, which `kept` holds as well, to a library. Fails

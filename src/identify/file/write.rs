@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Fit, ModelFile, Uncertainty};
+use super::{Fit, ModelFile, Setting, Uncertainty};
 use crate::identify::quantity::Quantity;
 
 /// The text of a model's file; each note becomes a comment at its head. Numbers
@@ -14,16 +14,7 @@ pub fn to_toml(model: &ModelFile, notes: &[String]) -> String {
     }
     put(&mut text, "version = 1");
     put(&mut text, &format!("kind = {}", quoted(&model.kind)));
-    let setting = &model.setting;
-    if let Some(material) = &setting.material {
-        put(&mut text, &format!("material = {}", quoted(material)));
-    }
-    for (key, value) in [("nozzle_mm", setting.nozzle_mm), ("temperature_c", setting.temperature_c)]
-    {
-        if let Some(value) = value {
-            put(&mut text, &format!("{key} = {}", number(value)));
-        }
-    }
+    put_setting(&mut text, &model.setting);
     let (input_at, output_at) = model.operating_point;
     put(&mut text, "\n# output - operating point = G(s) * (input - operating point)\n[input]");
     side(&mut text, &model.input, input_at);
@@ -41,6 +32,19 @@ pub fn to_toml(model: &ModelFile, notes: &[String]) -> String {
         put_uncertainty(&mut text, uncertainty);
     }
     text
+}
+
+/// What a file holds for, as far as it is known.
+pub(in crate::identify) fn put_setting(text: &mut String, setting: &Setting) {
+    if let Some(material) = &setting.material {
+        put(text, &format!("material = {}", quoted(material)));
+    }
+    for (key, value) in [("nozzle_mm", setting.nozzle_mm), ("temperature_c", setting.temperature_c)]
+    {
+        if let Some(value) = value {
+            put(text, &format!("{key} = {}", number(value)));
+        }
+    }
 }
 
 fn put_fit(text: &mut String, fit: &Fit) {
@@ -70,18 +74,20 @@ fn side(text: &mut String, quantity: &Quantity, at: f64) {
     put(text, &format!("operating_point = {}", number(at)));
 }
 
-fn put(text: &mut String, line: &str) {
+/// A line.
+pub(in crate::identify) fn put(text: &mut String, line: &str) {
     // Writing to a string cannot fail.
     let _ = writeln!(text, "{line}");
 }
 
-fn row(numbers: &[f64]) -> String {
+/// In brackets, with every digit.
+pub(in crate::identify) fn row(numbers: &[f64]) -> String {
     let numbers: Vec<String> = numbers.iter().map(|value| number(*value)).collect();
     format!("[{}]", numbers.join(", "))
 }
 
 /// With every digit, and a point where TOML would read a whole number.
-fn number(value: f64) -> String {
+pub(in crate::identify) fn number(value: f64) -> String {
     format!("{value:?}")
 }
 

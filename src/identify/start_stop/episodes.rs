@@ -52,6 +52,7 @@ pub(super) struct Episode {
 /// What a recording holds.
 #[derive(Debug, Clone)]
 pub(super) struct Episodes {
+    pub runs: usize,
     pub starts: Vec<Episode>,
     pub stops: Vec<Episode>,
 }
@@ -91,7 +92,7 @@ pub(super) fn find(command: &Series, flow: &Series) -> Result<Episodes, StartSto
     let stops: Vec<Episode> =
         runs.iter().zip(nexts).filter_map(|(run, next_s)| stop(flow, run, next_s)).collect();
     check_count(&starts, &stops, &runs)?;
-    Ok(Episodes { starts, stops })
+    Ok(Episodes { runs: runs.len(), starts, stops })
 }
 
 fn start(flow: &Series, last: &Run, run: &Run) -> Option<Episode> {

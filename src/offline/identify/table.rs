@@ -21,7 +21,8 @@ pub fn text(study: &Study) -> String {
     text
 }
 
-fn put(text: &mut String, head: &str, line: &str) {
+/// A line behind its head.
+pub fn put(text: &mut String, head: &str, line: &str) {
     // Writing to a string cannot fail.
     let _ = writeln!(text, "{}", format!("{head:<11}{line}").trim_end());
 }

@@ -1,5 +1,7 @@
 //! Recordings of starts and stops, as `identify` is given them.
 
+use std::fmt::Write as _;
+
 use super::melt::{Machine, Melt};
 use crate::identify::series::Series;
 use crate::sim::hash::{mix, normal_pair};
@@ -50,4 +52,28 @@ pub fn record(machine: Machine, seed: u64, plan: &Recording) -> [Series; 2] {
         }
     }
     [command, flow]
+}
+
+/// The example of `identify`: 11 starts and stops in nine minutes.
+pub fn example() -> Recording {
+    Recording {
+        idle_s: vec![2.0, 30.0, 5.0, 120.0, 1.0, 15.0, 8.0, 60.0, 3.0, 0.5, 240.0],
+        runs_s: 6.0,
+        mm3_per_s_per_rpm: 10.0,
+        step_s: 0.02,
+        sensor_mm3_per_s: 8.0,
+    }
+}
+
+/// Command \[rpm\] and flow \[mm³/s\] as the text of a table, a line for each
+/// sample of the flow.
+pub fn to_csv([command, flow]: &[Series; 2]) -> String {
+    let mut text = "time_s,screw_rpm,flow_mm3_per_s\n".to_owned();
+    for (time_s, flow) in flow.time_s.iter().zip(&flow.values) {
+        let told = command.time_s.partition_point(|from_s| from_s <= time_s);
+        let rpm = told.checked_sub(1).and_then(|at| command.values.get(at)).unwrap_or(&0.0);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{time_s:.3},{rpm},{flow:.2}");
+    }
+    text
 }
