@@ -154,7 +154,9 @@ impl Source {
     pub const fn about(self) -> &'static str {
         match self {
             Self::Barjuei2022 => "Shojaei Barjuei et al. 2022: width by robot speed",
-            Self::BcsThesis => "bead characterisation thesis: extruder models, speed by flow",
+            Self::BcsThesis => {
+                "bead characterisation thesis: extruder models, speed by flow, starts and stops"
+            }
             Self::Diagne2015 => "Diagne et al. 2015: screw with a delay of time and state",
             Self::Ma2026 => "Ma et al. 2026: pressure at the nozzle",
             Self::Looey2026 => "Mohammadi Looey et al. 2026: adaptive law of nozzle and plate",

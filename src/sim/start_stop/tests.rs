@@ -30,15 +30,13 @@ const SEEDS: u64 = 20;
 
 #[test]
 fn starts_and_stops_that_are_foretold_lose_a_fifth_of_what_the_best_fixed_dwell_times_lose() {
-    let (machine, keeps, follows) = (Machine::USUAL, bench(1.0), bench(0.05));
+    let (machine, follows) = (Machine::USUAL, bench(experiment::FOLLOWS_SHARE));
     let foretold = |bench: &Bench, seed: u64| {
         Timing::new(FOUND[usize::try_from(seed).unwrap()].parameters, bench.laid).unwrap()
     };
-    let best = tune(&keeps, machine, &IDLE_S, 0..3);
-    let naive = Dwell { start_s: machine.dead_time_s, stop_s: 0.0, ..best };
-    let [naive, best] = [naive, best].map(|dwell| mean(&keeps, machine, |_| dwell));
-    let steady = mean(&keeps, machine, |seed| foretold(&keeps, seed));
-    let ours = mean(&follows, machine, |seed| foretold(&follows, seed));
+    let found = experiment::run(machine, SEEDS).unwrap();
+    let [naive, best, steady, ours] =
+        [&found.naive, &found.fixed, &found.keeps, &found.follows].map(|all| experiment::sum(all));
     let ratio = |a: Score, b: Score| a.sum_mm3() / b.sum_mm3();
     assert!(ratio(best, ours) > 7.5, "{best:?} {ours:?}");
     assert!(best.void_mm3 > 12.0 * ours.void_mm3, "{best:?} {ours:?}");
@@ -147,4 +145,18 @@ fn a_seed_gives_the_same_beads_again_and_another_gives_others() {
     let lay = |seed| bench(1.0).lay(Machine::USUAL, seed, &dwell, &[3.0]);
     assert_eq!(lay(4), lay(4));
     assert_ne!(lay(4), lay(5));
+}
+
+#[test]
+fn what_is_watched_is_a_stop_and_a_start() {
+    let dwell = Dwell { start_s: 1.0, stop_s: 0.3, speed_mm_per_s: 40.0 };
+    let watched = bench(1.0).watch(Machine::USUAL, 1, &dwell, 30.0);
+    let flow = |moments: &[Moment], at_s: f64| {
+        moments.iter().find(|moment| moment.since_s >= at_s).unwrap().flow_mm3_per_s
+    };
+    assert!(flow(&watched.stop, 0.0) > 380.0 && flow(&watched.stop, 3.0) < 40.0);
+    assert!(flow(&watched.start, 0.5) < 40.0 && flow(&watched.start, 3.5) > 380.0);
+    // The robot leaves its place when its dwell is over.
+    let wanted = |at_s| watched.start.iter().find(|m| m.since_s >= at_s).unwrap().wanted_mm3_per_s;
+    assert!(wanted(0.95) < 1e-9 && wanted(1.3) > 390.0);
 }

@@ -8,8 +8,11 @@ use crate::offline::reproduce::{ReproduceError, Rows, Section};
 use crate::sim::start_stop::experiment::{FOLLOWS_SHARE, Losses, run, sum};
 use crate::sim::start_stop::{IDLE_S, Machine, Score};
 
-const CASES: [&str; 3] =
-    ["starts and stops, robot follows", "starts and stops, robot keeps its speed", "no dwell"];
+const CASES: [&str; 3] = [
+    "starts and stops, robot follows",
+    "starts and stops, robot keeps its speed",
+    "starts and stops, no dwell at all",
+];
 /// A volume of a score, with what it is called.
 type Volume = (&'static str, fn(&Score) -> f64);
 const VOLUMES: [Volume; 3] = [
