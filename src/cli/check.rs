@@ -194,10 +194,10 @@ fn about_law(loaded: &LoadedCell, run: &RunPart) {
     say!("  law          by distance, b = {}{learnt}", told.value);
     let gauge = loaded.cell.gauge_length(&loaded.calibration);
     say!(
-        "               gauge {:.1} mm long, {} ± {} behind the nozzle",
+        "               gauge {:.1} mm long, {:.1} ± {:.1} mm behind the nozzle",
         gauge.get(),
-        run.camera.offset,
-        run.camera.offset_sigma
+        run.camera.offset.get(),
+        run.camera.offset_sigma.get()
     );
     if gauge > run.camera.offset * 0.5 {
         say!("  WARNING      gauge.roi_px is more than half as long as offset_mm: a shorter one");

@@ -44,7 +44,7 @@ impl DistanceSummary {
             }
         });
         format!(
-            "{taken} widths taken, {outliers} outliers, {changes} changes of the flow. At last the \
+            "Widths taken {taken}, outliers {outliers}, changes of the flow {changes}. At last the \
              bead was believed to be {level_mm:.2} mm wide at the start speed, with b = \
              {exponent:.3}, seen {offset_mm:.1} mm behind the nozzle.{pulsation}{fallback}"
         )
