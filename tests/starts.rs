@@ -68,9 +68,12 @@ fn the_example_becomes_a_file_that_is_read_again() {
         let sigma = (one.of)(&found.sigma);
         assert!(answer.contains(one.key) && sigma > 0.0 && sigma.is_finite(), "{}", one.key);
     }
-    // Within what the model, which knows one void, can tell of two.
-    let void = found.parameters.void_after(60.0);
-    assert!((void - 575.0).abs() < 0.08 * 575.0, "{void}");
+    // The model knows one void where there are two, each pause's own varies by 3 %, and melt
+    // under pressure goes with them.
+    for (idle_s, truth) in [(10.0, 239.0), (30.0, 467.0), (240.0, 646.0)] {
+        let void = found.parameters.void_after(idle_s);
+        assert!((void - truth).abs() < 65.0, "{idle_s}: {void}");
+    }
     assert!((found.parameters.first_flow_s - 0.2).abs() < 0.08, "{:?}", found.parameters);
     let page = fs::read_to_string(at("found/report.html")).unwrap();
     assert!(page.contains("delay of the first flow [s]") && page.matches("<circle").count() >= 11);

@@ -1,12 +1,12 @@
 //! Starts and stops as text.
 
 use super::StartStudy;
-use crate::identify::number::{brief, short};
+use crate::identify::number::brief;
 use crate::identify::start_stop::file::{Named, START, STOP};
 use crate::offline::identify::table::{put, significant};
 
 /// Pauses after which the delay is told \[s\].
-const TOLD_S: [f64; 4] = [1.0, 10.0, 60.0, 300.0];
+const TOLD_S: [f64; 4] = [1.0, 10.0, 60.0, 200.0];
 
 /// A short table.
 pub fn text(study: &StartStudy) -> String {
@@ -39,7 +39,7 @@ fn data(text: &mut String, study: &StartStudy) {
     put(text, "data", &line);
     put(text, "input", &logs.input.to_string());
     put(text, "output", &logs.output.to_string());
-    let [shortest_s, longest_s] = seen.idle_range_s.map(short_enough);
+    let [shortest_s, longest_s] = seen.idle_range_s.map(brief);
     let [least, most] = seen.flow_range_mm3_per_s.map(brief);
     let line = format!(
         "{} after pauses of {shortest_s} to {longest_s} s, to {least} to {most} mm³/s",
@@ -57,10 +57,6 @@ fn data(text: &mut String, study: &StartStudy) {
     put(text, "stops", &seen.stops.to_string());
 }
 
-fn short_enough(value: f64) -> String {
-    short((value * 1000.0).round() / 1000.0)
-}
-
 fn parameters(text: &mut String, study: &StartStudy, list: &[Named]) {
     for one in list {
         let [value, sigma] =
@@ -72,7 +68,10 @@ fn parameters(text: &mut String, study: &StartStudy, list: &[Named]) {
 /// What the parameters come to for a bead of the log.
 fn meaning(text: &mut String, study: &StartStudy) {
     let (of, flow) = (&study.fit.parameters, study.flow_mm3_per_s());
-    let delays = TOLD_S.map(|idle_s| format!("{:.2} s after {idle_s} s", of.delay_s(idle_s, flow)));
+    let [_, longest_s] = study.file.seen.idle_range_s;
+    let seen = TOLD_S.iter().filter(|idle_s| **idle_s <= longest_s);
+    let told = |idle_s: &f64| format!("{:.2} s after {idle_s} s", of.delay_s(*idle_s, flow));
+    let delays: Vec<String> = seen.map(told).collect();
     put(text, "first flow", &format!("at {} mm³/s: {}", brief(flow), delays.join(", ")));
     put(
         text,
@@ -80,7 +79,7 @@ fn meaning(text: &mut String, study: &StartStudy) {
         &format!("{:.4} s of the delays about the model", study.fit.delay_scatter_s),
     );
     let line = format!(
-        "{} mm³ come after the command to stop, the last tenth of the flow {:.2} s after it",
+        "{} mm³ come after the command to stop; the flow is down to a tenth {:.2} s after it",
         brief(flow * of.after_stop_s()),
         of.falls_to_s(0.1)
     );
