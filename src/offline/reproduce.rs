@@ -16,6 +16,7 @@ use crate::extruder::pressure::PressureError;
 use crate::model::ModelError;
 use crate::sim::bcs_thesis::fit_table::FitTableError;
 use crate::sim::cell::SimError;
+use crate::sim::corner::CornerError;
 use crate::sim::render::RenderError;
 
 pub mod barjuei2022;
@@ -105,6 +106,9 @@ pub enum ReproduceError {
     /// Starts and stops cannot be told or timed.
     #[error(transparent)]
     StartStop(#[from] crate::sim::start_stop::experiment::ExperimentError),
+    /// A corner cannot be planned or run.
+    #[error(transparent)]
+    Corner(#[from] CornerError),
     /// A model cannot be.
     #[error(transparent)]
     Model(#[from] ModelError),

@@ -1,5 +1,7 @@
-//! The bead characterisation thesis beside its tables 3 and 4.
+//! The bead characterisation thesis beside its tables 3 and 4, and the corner that it
+//! leaves for later.
 
+mod corner;
 mod draw;
 mod start_stop;
 
@@ -17,7 +19,7 @@ use crate::sim::bcs_thesis::on_off::{
 };
 
 /// What progress is told of.
-pub const EXPERIMENTS: u64 = 7;
+pub const EXPERIMENTS: u64 = 8;
 const SEEDS: u64 = 10;
 /// Seeds of the table of fits.
 const FIT_SEEDS: u64 = 6;
@@ -67,6 +69,8 @@ pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, Reprod
     sections.push(sensing(seeds, &mut rows)?);
     progress.advance();
     sections.push(start_stop::section(effort.seeds.unwrap_or(START_SEEDS), &mut rows)?);
+    progress.advance();
+    sections.push(corner::corner(effort, &mut rows)?);
     progress.advance();
     accuracy_bounds(&mut rows)?;
     progress.advance();

@@ -15,7 +15,7 @@ use crate::vision::Method;
 /// Height of a layer.
 const LAYER: Mm = Mm::constant(20.0);
 /// Length of a layer, and of its start.
-const PATH: Mm = Mm::constant(1200.0);
+const PATH: Mm = Mm::constant(1500.0);
 const START: Mm = Mm::constant(200.0);
 /// Width that is asked for.
 const WIDTH: Mm = Mm::constant(42.0);

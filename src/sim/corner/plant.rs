@@ -77,6 +77,16 @@ impl Run {
         Ok(Self { speed: speed.clone(), flow })
     }
 
+    /// Place \[mm\], speed \[mm/s\] and flow \[mm³/s\], every millisecond within ±100 mm of the
+    /// corner.
+    pub fn course(&self) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
+        let all = moments(self.speed.duration_s()).zip(&self.flow).map(|(now, flow)| {
+            let path_mm = self.speed.path_at(now);
+            (path_mm, self.speed.speed_at(path_mm), *flow)
+        });
+        all.filter(|(path_mm, ..)| path_mm.abs() <= JUDGED_MM)
+    }
+
     /// What is laid as the model has it.
     pub fn quiet(&self) -> Laid {
         self.laid(&self.flow)

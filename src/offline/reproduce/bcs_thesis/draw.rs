@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 
+use super::corner::Around;
 use crate::offline::report::area::{Area, XAxis};
 use crate::offline::report::palette::{self, Ink};
 use crate::offline::report::plot::{Layer as Drawn, Plot, y_range};
@@ -10,6 +11,7 @@ use crate::offline::reproduce::series;
 use crate::sim::bcs_thesis as plant;
 use crate::sim::bcs_thesis::fit_table::{FitRow, FitTable};
 use crate::sim::bcs_thesis::on_off::{Compared, Run};
+use crate::sim::corner::{BEAD, Drive, JUDGED_MM, Row};
 
 /// What is drawn once more, more closely \[s\].
 const CLOSER_S: (f64, f64) = (40.0, 60.0);
@@ -124,4 +126,33 @@ pub fn sensing(found: &[(f64, f64)], bound: &[(f64, f64)]) -> Markup {
     let axis = XAxis { title: "camera behind the nozzle [mm]".to_owned(), range, divisor: 1.0 };
     let curves = [(bound, "bound", palette::LIMIT), (found, "ours", palette::OURS)];
     plot("area RMSE, off over on", &axis, &curves, None)
+}
+
+/// What is gained for the time that is added, and runs around the corner.
+pub fn corner(rows: &[Row], runs: &[Around; 3]) -> Markup {
+    let of = |value: &dyn Fn(&Row) -> f64| -> Vec<(f64, f64)> {
+        rows.iter().map(|row| (row.budget_s, value(row))).collect()
+    };
+    let bound = of(&|row| row.bound_ratio(Drive::Constant));
+    let constant = of(&|row| row.ratio(Drive::Constant));
+    let proportional = of(&|row| row.ratio(Drive::Proportional));
+    let ratios = [
+        (bound.as_slice(), "bound for the constant one, without noise", palette::LIMIT),
+        (constant.as_slice(), "a constant extruder over ours", palette::PAPER),
+        (proportional.as_slice(), "a proportional extruder over ours", palette::DEMAND),
+    ];
+    let range = (0.0, rows.last().map_or(1.0, |row| row.budget_s));
+    let time = XAxis { title: "time that may be added [s]".to_owned(), range, divisor: 1.0 };
+    let path = XAxis::path((-JUDGED_MM, JUDGED_MM));
+    let inks = [palette::PAPER, palette::DEMAND, palette::OURS];
+    let over = |pick: fn(&Around) -> &[(f64, f64)]| -> Vec<Curve<'_>> {
+        runs.iter().zip(inks).map(|(run, ink)| (pick(run), run.name, ink)).collect()
+    };
+    html! {
+        (plot("width error RMS, baseline over planned", &time, &ratios, Some(1.0)))
+        (plot("width error [%]", &path, &over(|run| &run.error), Some(0.0)))
+        (plot("robot's speed [mm/s]", &path, &over(|run| &run.speed), None))
+        (plot("flow at the nozzle [mm³/s]", &path, &over(|run| &run.flow), None))
+        p.hint { "Per cent are of a bead of " (BEAD.area_mm2) " mm², averaged over the nozzle." }
+    }
 }
