@@ -39,6 +39,7 @@ pub mod identify;
 pub mod models;
 pub mod offset;
 pub mod outcome;
+pub mod plan;
 pub mod process;
 pub mod recorded;
 pub mod render;
@@ -103,6 +104,7 @@ enum Command {
     Excite(excite::ExciteArgs),
     Identify(Box<identify::IdentifyArgs>),
     Models(models::ModelsArgs),
+    Plan(plan::PlanArgs),
 }
 
 /// How much a command says on standard error.
@@ -151,6 +153,7 @@ pub fn main() -> ExitCode {
         Command::Excite(args) => excite::run(args).map(|()| ExitCode::SUCCESS),
         Command::Identify(args) => identify::run(args).map(|()| ExitCode::SUCCESS),
         Command::Models(args) => models::run(args),
+        Command::Plan(args) => plan::run(args).map(|()| ExitCode::SUCCESS),
     };
     done.unwrap_or_else(|error| {
         tell!("error: {error:#}");

@@ -16,6 +16,7 @@ pub mod offset;
 pub mod output;
 pub mod picker;
 pub mod picture;
+pub mod planned;
 pub mod progress;
 pub mod recorded;
 pub mod replay;

@@ -29,6 +29,7 @@
 
 mod descent;
 mod extruder;
+pub mod foretell;
 pub mod gcode;
 mod grid;
 mod horizon;
@@ -43,6 +44,7 @@ mod step;
 #[cfg(test)]
 mod tests;
 
-pub use limits::{PathLimits, time_optimal};
+pub use foretell::{Foretold, Unplanned};
+pub use limits::{PathLimits, attainable, time_optimal};
 pub use profile::{ProfileError, SpeedProfile};
 pub use solve::{Bead, Limits, Plan, PlanError, RobotLimits, Task, Unmodelled, solve};

@@ -106,6 +106,20 @@ impl Extruder {
     }
 }
 
+/// What comes of a command over time \[s\], asked for tick by tick, at whose first value
+/// the extruder has settled.
+pub fn follow(
+    model: &TransferFunction,
+    mut command: impl FnMut(f64) -> f64,
+    until_s: f64,
+) -> Result<Course, ModelError> {
+    let Extruder { mut flow, mut past, .. } = Extruder::settled(model, command(0.0))?;
+    for tick in 1..=whole(until_s / TICK_S) + 1 {
+        past.push(flow.step(command(TICK_S * float(tick))));
+    }
+    Ok(past)
+}
+
 fn run(flow: &mut Simulator, from: f64, knots: &[f64], course: &mut Course) {
     let mut last = from;
     for knot in knots {

@@ -82,6 +82,14 @@ fn check(limits: &PathLimits) -> Result<(), ProfileError> {
     Ok(())
 }
 
+/// The quickest speed below a profile that an acceleration allows \[mm/s²\].
+pub fn attainable(profile: &SpeedProfile, accel: f64) -> Result<SpeedProfile, ProfileError> {
+    let mut squares = profile.squares().to_vec();
+    reach(profile.path(), &mut squares, accel);
+    let nodes: Vec<_> = profile.path().iter().copied().zip(squares).collect();
+    SpeedProfile::of_squares(&nodes)
+}
+
 /// Lowers squares of the speed until each can be reached from the one before it and be
 /// left for the one after it.
 pub(super) fn reach(path: &[f64], squares: &mut [f64], accel: f64) {

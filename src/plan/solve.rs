@@ -1,14 +1,12 @@
 //! What a plan is asked for with, and what it says.
 
-use super::extruder::{Extruder, KNOT_S, float, whole};
-use super::limits::reach;
+use super::extruder::{KNOT_S, float, whole};
+use super::foretell::Foretold;
+use super::limits::attainable;
 use super::long::Long;
 use super::profile::{ProfileError, SpeedProfile};
 use crate::extruder::limits::CommandLimits;
 use crate::model::{ModelError, TransferFunction};
-
-/// Distance of the places for which the width is foretold, in lengths of the nozzle.
-const FORETOLD_EVERY: f64 = 0.05;
 
 /// What the robot can do along a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -191,33 +189,14 @@ impl Task<'_> {
 /// first speed when the plan begins.
 pub fn solve(task: &Task<'_>, nominal: &SpeedProfile) -> Result<Plan, PlanError> {
     task.check()?;
-    let mut squares = nominal.squares().to_vec();
-    reach(nominal.path(), &mut squares, task.limits.robot.accel_mm_per_s2);
-    let nodes: Vec<_> = nominal.path().iter().copied().zip(squares.iter().copied()).collect();
-    let nominal = SpeedProfile::of_squares(&nodes)?;
+    let nominal = attainable(nominal, task.limits.robot.accel_mm_per_s2)?;
+    let squares = nominal.squares();
     task.steady(squares.iter().copied().fold(0.0, f64::max).sqrt())?;
     let start = task.steady(squares.first().copied().unwrap_or(0.0).sqrt())?;
     let (speed, knots) = Long::new(task, &nominal, start)?.plan()?;
-    let foretold = foretell(task, &speed, (start, &knots))?;
     let added_s = speed.duration_s() - nominal.duration_s();
     let command = std::iter::once(start).chain(knots).collect();
-    Ok(Plan { speed, command, foretold, added_s })
-}
-
-/// By which share the width is off along a whole plan.
-fn foretell(
-    task: &Task<'_>,
-    speed: &SpeedProfile,
-    (start, knots): (f64, &[f64]),
-) -> Result<Vec<AlongPath>, ModelError> {
-    let course = Extruder::settled(task.extruder, start)?.foretell(knots);
-    let half = 0.5 * task.bead.nozzle_mm;
-    let full = task.bead.area_mm2 * task.bead.nozzle_mm;
-    let every = FORETOLD_EVERY * task.bead.nozzle_mm;
-    let volume = |path_mm: f64| course.volume_at(speed.time_at(path_mm));
-    let first = speed.start_mm() + half;
-    let count = whole((speed.end_mm() - half - first) / every);
-    let places = (0..=count).map(|k| first + every * float(k));
-    let inside = places.filter(|at| at + half <= speed.end_mm());
-    Ok(inside.map(|at| (at, (volume(at + half) - volume(at - half)) / full - 1.0)).collect())
+    let mut plan = Plan { speed, command, foretold: Vec::new(), added_s };
+    plan.foretold = Foretold::new(task, &plan.speed, |time_s| plan.command_at(time_s))?.width;
+    Ok(plan)
 }

@@ -24,6 +24,8 @@ use crate::offline::recorded::COMMAND;
 use crate::time::Span;
 use crate::units::Rpm;
 
+const WITHOUT_FILE: &str = "found a strategy without its file";
+
 /// What the strategy's file is called in a recording; none where it has none.
 pub fn attachment(strategy: &Strategy) -> Option<&'static str> {
     match strategy {
@@ -75,17 +77,12 @@ pub fn setup(
     cell: &str,
     file: Option<&ExtruderFile>,
 ) -> anyhow::Result<ExtruderSetup> {
-    let needed = || file.ok_or_else(|| wrong(cell, "found a strategy without its file"));
+    let needed = || file.ok_or_else(|| wrong(cell, WITHOUT_FILE));
     let law = match &part.extruder.strategy {
         Strategy::Constant { value } => Law::Constant(Constant(*value)),
         Strategy::Profile { .. } => Law::Profile(played(needed()?, part)?),
         Strategy::Feedforward(keys) => {
-            let behaviour = match &keys.model {
-                ModelSource::Screw(screw) => carried(*screw)?,
-                ModelSource::File(_) | ModelSource::Library { .. } => {
-                    identified(keys, part, cell, needed()?)?
-                }
-            };
+            let behaviour = behaviour(keys, part, cell, file)?;
             Law::Feedforward(Box::new(foreseen(keys, run, part, cell, behaviour)?))
         }
         Strategy::Pressure(settings) => Law::Pressure(Box::new(PressureLoop::new(**settings))),
@@ -93,6 +90,21 @@ pub fn setup(
         Strategy::Adaptive(parts) => Law::Adaptive(AdaptiveNozzle::new(parts.0, parts.1)),
     };
     Ok(part.extruder.setup(law))
+}
+
+/// How the extruder of a cell behaves about its operating point, from the command to
+/// mm³/s.
+pub fn behaviour(
+    keys: &FeedforwardKeys,
+    part: &ExtruderPart,
+    cell: &str,
+    file: Option<&ExtruderFile>,
+) -> anyhow::Result<(TransferFunction, OperatingPoint)> {
+    match (&keys.model, file) {
+        (ModelSource::Screw(screw), _) => carried(*screw),
+        (_, Some(file)) => identified(keys, part, cell, file),
+        (_, None) => Err(wrong(cell, WITHOUT_FILE).into()),
+    }
 }
 
 fn wrong(cell: &str, what: &str) -> WrongArguments {

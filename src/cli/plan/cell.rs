@@ -1,0 +1,182 @@
+//! What a plan takes from its cell.
+
+use super::PlanArgs;
+use super::job::{Bead, wrong};
+use crate::cli::WrongArguments;
+use crate::cli::cell::{LoadedCell, extruder};
+use crate::config::cell::{ExtruderPart, Purpose, RunPart};
+use crate::config::extruder::Strategy;
+use crate::extruder::CommandLimits;
+use crate::extruder::demand::section;
+use crate::extruder::law::OperatingPoint;
+use crate::identify::file as model;
+use crate::io::record::ExtruderFile;
+use crate::model::TransferFunction;
+use crate::offline::planned::Facts;
+use crate::plan;
+
+/// How long the flow that no model tells hangs together \[s\], as in the bead
+/// characterisation thesis.
+const CORRELATION_S: f64 = 0.15;
+
+/// What a model was identified with.
+#[derive(Debug)]
+struct Identified {
+    /// What messages call the model.
+    source: String,
+    /// Smallest and largest input.
+    range: (f64, f64),
+}
+
+/// The cell as a plan sees it.
+#[derive(Debug)]
+pub struct Extruder {
+    /// What messages call the cell.
+    name: String,
+    /// From the command, counted from [`Facts::idle`], to mm³/s.
+    transfer: TransferFunction,
+    /// Limits of such a command, of which none lets the flow run backwards.
+    drive: CommandLimits,
+    /// Limits of the command itself.
+    told: CommandLimits,
+    /// What the model was identified with, where it was.
+    identified: Option<Identified>,
+    /// Largest speed \[mm/s\].
+    pub fastest_mm_per_s: f64,
+    /// Acceleration \[mm/s²\].
+    pub accel_mm_per_s2: f64,
+    /// Length over which the nozzle averages what it lays \[mm\].
+    pub nozzle_mm: f64,
+    /// The bead and the command's unit.
+    pub facts: Facts,
+}
+
+impl Extruder {
+    /// Reads the cell, its model and its limits.
+    pub fn read(args: &PlanArgs) -> anyhow::Result<Self> {
+        let loaded = LoadedCell::read(&args.cell, Purpose::Run)?;
+        let name = loaded.path.display().to_string();
+        let absent = |what: &str| WrongArguments::new(format!("{name}: {what}"));
+        let Some(run) = &loaded.cell.run else {
+            return Err(absent("found no robot, expected a cell that suffices for run").into());
+        };
+        let Some(part) = &run.extruder else {
+            let what = "[extruder]: found nothing, expected an extruder with a model: strategy = \
+                        \"feedforward\"";
+            return Err(absent(what).into());
+        };
+        let Strategy::Feedforward(keys) = &part.extruder.strategy else {
+            let what = "extruder.strategy: found one without a model from its command to the \
+                        flow, expected \"feedforward\" with model, library or mm3_per_turn";
+            return Err(absent(what).into());
+        };
+        let file = extruder::file(part, &name)?;
+        let behaviour = extruder::behaviour(keys, part, &name, file.as_ref())?;
+        let identified = identified(file.as_ref())?;
+        Self::of(args, (run, part), (name, identified), behaviour)
+    }
+
+    fn of(
+        args: &PlanArgs,
+        (run, part): (&RunPart, &ExtruderPart),
+        (name, identified): (String, Option<Identified>),
+        (transfer, about): (TransferFunction, OperatingPoint),
+    ) -> anyhow::Result<Self> {
+        if !run.control.target.is_constant() {
+            let what = format!("{name}: found a target that changes, expected one target_width_mm");
+            return Err(WrongArguments::new(what).into());
+        }
+        let target = run.control.target.nominal();
+        let area = section(target, part.extruder.layer_height).map_err(WrongArguments::new)?;
+        let told = part.extruder.limits;
+        let idle = about.command - about.flow_mm3_per_s / transfer.dc_gain();
+        let (min, max) = told.about(idle).range();
+        let drive = CommandLimits::new(min.max(0.0), max, told.rate_per_s())
+            .map_err(|error| WrongArguments::new(format!("{name}: [extruder]: {error}")))?;
+        Ok(Self {
+            name,
+            transfer,
+            drive,
+            told,
+            identified,
+            fastest_mm_per_s: run.limits.max_speed.get(),
+            accel_mm_per_s2: run.limits.max_accel.get(),
+            nozzle_mm: args.nozzle_mm.unwrap_or(target.get()),
+            facts: Facts {
+                width_mm: target.get(),
+                area_mm2: area.get(),
+                idle,
+                unit: part.extruder.drive.unit(),
+            },
+        })
+    }
+
+    /// What is planned for.
+    pub fn task(&self, args: &PlanArgs) -> plan::Task<'_> {
+        let robot = plan::RobotLimits {
+            accel_mm_per_s2: self.accel_mm_per_s2,
+            slowest_mm_per_s: args.apex_mm_per_s,
+        };
+        plan::Task {
+            limits: plan::Limits { robot, drive: self.drive, budget_s: args.budget_s },
+            bead: plan::Bead { area_mm2: self.facts.area_mm2, nozzle_mm: self.nozzle_mm },
+            unmodelled: plan::Unmodelled {
+                share: args.unmodelled_share,
+                correlation_s: CORRELATION_S,
+            },
+            extruder: &self.transfer,
+        }
+    }
+
+    /// Refuses speeds that robot or extruder cannot have.
+    pub fn check_speeds(
+        &self,
+        beads: &[Bead],
+        job: &std::path::Path,
+    ) -> Result<(), WrongArguments> {
+        let squares = || beads.iter().flat_map(|bead| bead.nominal.squares().iter().copied());
+        let fastest = squares().fold(0.0, f64::max).sqrt();
+        if fastest > self.fastest_mm_per_s * (1.0 + 1e-9) {
+            let what = format!(
+                "found {fastest:.3} mm/s, expected at most {} mm/s, max_speed_mm_per_s of {}",
+                self.fastest_mm_per_s, self.name
+            );
+            return Err(wrong(job, &what));
+        }
+        let first = beads.iter().filter_map(|bead| bead.nominal.squares().first().copied());
+        let slowest = first.fold(f64::INFINITY, f64::min).sqrt();
+        for speed in [fastest, slowest] {
+            let flow = speed * self.facts.area_mm2;
+            let command = flow / self.transfer.dc_gain() + self.facts.idle;
+            let (min, max) = self.told.range();
+            if command < min || command > max {
+                let unit = self.facts.unit;
+                let what = format!(
+                    "{speed:.3} mm/s take {flow:.1} mm³/s and so {command:.4} {unit}, but \
+                     [extruder] of {} allows {min} to {max} {unit}; change the job's speed there",
+                    self.name
+                );
+                return Err(wrong(job, &what));
+            }
+        }
+        Ok(())
+    }
+
+    /// Tells where commands lie beyond what the model was identified with.
+    pub fn warn_beyond(&self, (low, high): (f64, f64)) {
+        let Some(Identified { source, range: (least, most) }) = &self.identified else { return };
+        if low < *least || high > *most {
+            tell!(
+                "warning: {source}: it was identified from {least} to {most} {unit}, and the plan \
+                 has commands from {low:.4} to {high:.4} {unit}; what it says there is a guess",
+                unit = self.facts.unit
+            );
+        }
+    }
+}
+
+fn identified(file: Option<&ExtruderFile>) -> anyhow::Result<Option<Identified>> {
+    let Some(file) = file else { return Ok(None) };
+    let model = model::parse(&file.source, &file.text)?;
+    Ok(Some(Identified { source: file.source.clone(), range: model.input_range }))
+}

@@ -1,0 +1,68 @@
+//! The beads of a job from its file.
+
+use std::fs;
+use std::path::Path;
+
+use super::PlanArgs;
+use super::cell::Extruder;
+use crate::cli::WrongArguments;
+use crate::plan::{SpeedProfile, gcode, job};
+
+/// Endings of files with G-code.
+const GCODE: [&str; 3] = ["gcode", "nc", "g"];
+
+/// A bead before it is planned.
+#[derive(Debug)]
+pub struct Bead {
+    /// What it is called.
+    pub name: String,
+    /// Its nominal speed.
+    pub nominal: SpeedProfile,
+    /// Path and position \[mm\].
+    pub position: Vec<(f64, [f64; 3])>,
+}
+
+/// What is wrong with a job, with its file's name.
+pub fn wrong(job: &Path, what: &impl ToString) -> WrongArguments {
+    WrongArguments::new(format!("job {}: {}", job.display(), what.to_string()))
+}
+
+/// Reads a job by its ending.
+pub fn read(args: &PlanArgs, extruder: &Extruder) -> Result<Vec<Bead>, WrongArguments> {
+    let path = &args.job;
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let is_gcode = GCODE.contains(&ending.as_str());
+    if !is_gcode && ending != "csv" {
+        let expected = format!("expected one that ends with .csv, .{}", GCODE.join(", ."));
+        return Err(wrong(path, &expected));
+    }
+    let text = fs::read_to_string(path).map_err(|error| wrong(path, &error))?;
+    if is_gcode {
+        return of_gcode(args, extruder, &text);
+    }
+    if args.corner_mm.is_some() {
+        let what = "--corner-mm is for G-code; a table tells its speed at every corner";
+        return Err(wrong(path, &what));
+    }
+    let job = job::read(&text).map_err(|error| wrong(path, &error))?;
+    Ok(vec![Bead { name: "Along the bead".to_owned(), nominal: job.speed, position: job.position }])
+}
+
+fn of_gcode(args: &PlanArgs, extruder: &Extruder, text: &str) -> Result<Vec<Bead>, WrongArguments> {
+    let settings = gcode::Settings {
+        start_mm: [0.0; 3],
+        fastest_mm_per_s: extruder.fastest_mm_per_s,
+        accel_mm_per_s2: extruder.accel_mm_per_s2,
+        corner_mm: args.corner_mm.unwrap_or(0.0),
+        apex_mm_per_s: args.apex_mm_per_s,
+    };
+    let stretches = gcode::read(text, &settings).map_err(|error| wrong(&args.job, &error))?;
+    let bead = |stretch: gcode::Stretch| {
+        let name = format!("Along the bead from line {} on", stretch.line);
+        let nominal = stretch
+            .nominal(extruder.accel_mm_per_s2)
+            .map_err(|error| wrong(&args.job, &format!("line {}: {error}", stretch.line)))?;
+        Ok(Bead { name, nominal, position: stretch.position })
+    };
+    stretches.into_iter().map(bead).collect()
+}
