@@ -89,7 +89,13 @@ fn every_bead_of_gcode_is_planned_from_rest_to_rest() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let text = "G1 X150 F6000\nG0 Y50\nG1 X50 F3000\n";
-    let answer = plan(&job(folder.path(), "two.NC", text), CELL, &out, &["--budget-s", "0.3"], 0);
+    let answer = plan(
+        &job(folder.path(), "two.NC", text),
+        CELL,
+        &out,
+        &["--budget-s", "0.3", "--nozzle-mm", "9"],
+        0,
+    );
     assert!(answer.contains("250.0 mm in 2 beads"), "{answer}");
     let rows = columns(&out, ["bead", "time_s", "x_mm", "speed_mm_per_s"]);
     for (bead, from, to) in [(1.0, 0.0, 150.0), (2.0, 150.0, 50.0)] {
@@ -102,7 +108,8 @@ fn every_bead_of_gcode_is_planned_from_rest_to_rest() {
     assert!(page.contains("from line 1 on") && page.contains("from line 3 on"));
     // A corner that may be rounded is passed faster.
     let sharp = format!("{JOBS}/corner.gcode");
-    let round = plan(&sharp, CELL, &out, &["--corner-mm", "1", "--budget-s", "0"], 0);
+    let round =
+        plan(&sharp, CELL, &out, &["--corner-mm", "1", "--nozzle-mm", "20", "--budget-s", "0"], 0);
     assert!(round.contains("slowest    34.7 mm/s"), "{round}");
     keeps_its_limits(&out);
 }

@@ -161,12 +161,16 @@ fn summary(beads: &[PlannedBead], extruder: &Extruder) -> Vec<(String, String)> 
             format!(
                 "{:.2} s, {:.2} s added",
                 sum(|bead| bead.plan.speed.duration_s()),
-                sum(|bead| bead.plan.added_s)
+                // Rounding alone may make it less than nothing.
+                sum(|bead| bead.plan.added_s).max(0.0)
             ),
         ),
         ("error", format!("{} RMS of the width, planned", error(|bead| &bead.planned))),
-        ("", format!("{} not planned, constant command", error(|bead| &bead.constant))),
-        ("", format!("{} not planned, in proportion", error(|bead| &bead.proportional))),
+        ("constant", format!("{} not planned, constant command", error(|bead| &bead.constant))),
+        (
+            "following",
+            format!("{} not planned, in proportion to the speed", error(|bead| &bead.proportional)),
+        ),
     ];
     if let Some(slowest) = slowest(beads, extruder.nozzle_mm) {
         lines.push(("slowest", format!("{slowest:.1} mm/s")));

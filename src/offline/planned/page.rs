@@ -63,20 +63,21 @@ fn section(bead: &PlannedBead, facts: &Facts) -> Markup {
         series
     };
     let widths = [
-        (width(&bead.constant), "not planned, constant command", palette::PAPER, false),
         (
             width(&bead.proportional),
             "not planned, in proportion to the speed",
             palette::HOLDING,
             false,
         ),
+        (width(&bead.constant), "not planned, constant command", palette::PAPER, false),
         (width(&bead.planned), "planned", palette::OURS, false),
     ];
     html! {
         section {
             h2 { (bead.name) }
-            p.hint { "Foretold from the model, as the mean over a nozzle's length; what no model \
-                tells comes on top." }
+            p.hint { "Foretold from the model, as the mean over the nozzle's length; what no model \
+                tells comes on top. Dips of the speed a nozzle's length apart count on that length: \
+                tell it as it is." }
             (plot("width [mm]", &path, &widths, Some(facts.width_mm)))
             (plot("speed [mm/s]", &path, &speeds, None))
             (plot("flow [mm³/s]", &path, &flows, None))

@@ -89,7 +89,12 @@ impl Run {
 
     /// What is laid as the model has it.
     pub fn quiet(&self) -> Laid {
-        self.laid(&self.flow)
+        self.quiet_over(BEAD.nozzle_mm)
+    }
+
+    /// The same as the mean over another length than the nozzle's \[mm\].
+    pub fn quiet_over(&self, length_mm: f64) -> Laid {
+        self.laid(&self.flow, length_mm)
     }
 
     /// Error without and with flow that no model tells.
@@ -112,15 +117,15 @@ impl Run {
             noise = kept * noise + fresh * normal_pair(mix(&[seed, 3, step]))[0];
             here
         });
-        self.laid(&flow.collect::<Vec<f64>>())
+        self.laid(&flow.collect::<Vec<f64>>(), BEAD.nozzle_mm)
     }
 
     /// Root mean square that the noise alone is expected to leave.
     pub fn floor(&self) -> f64 {
         let sigma = UNMODELLED.share * self.change();
-        let full = BEAD.area_mm2 * BEAD.nozzle_mm;
+        let (full, half) = (BEAD.area_mm2 * BEAD.nozzle_mm, 0.5 * BEAD.nozzle_mm);
         let spread: Vec<f64> = places()
-            .map(|at| UNMODELLED.spread(self.time(at, 0.5) - self.time(at, -0.5)).sqrt())
+            .map(|at| UNMODELLED.spread(self.time(at + half) - self.time(at - half)).sqrt())
             .collect();
         sigma / full * mean_square(&spread).sqrt()
     }
@@ -137,12 +142,12 @@ impl Run {
         deviation(&self.flow, from, to).max(deviation(&self.flow, judged[0], judged[1]))
     }
 
-    /// When the nozzle is a share of its length away from a place \[s\].
-    fn time(&self, path_mm: f64, share: f64) -> f64 {
-        self.speed.time_at(path_mm + share * BEAD.nozzle_mm)
+    /// When the nozzle's middle is at a place \[s\].
+    fn time(&self, path_mm: f64) -> f64 {
+        self.speed.time_at(path_mm)
     }
 
-    fn laid(&self, flow: &[f64]) -> Laid {
+    fn laid(&self, flow: &[f64], length_mm: f64) -> Laid {
         let mut sum = 0.0;
         let pairs = flow.iter().zip(flow.iter().skip(1));
         let volume: Vec<f64> = std::iter::once(0.0)
@@ -151,7 +156,7 @@ impl Run {
                 sum
             }))
             .collect();
-        let full = BEAD.area_mm2 * BEAD.nozzle_mm;
+        let (full, half) = (BEAD.area_mm2 * length_mm, 0.5 * length_mm);
         let at = |time_s: f64| {
             let step = whole(time_s / STEP_S).min(volume.len().saturating_sub(2));
             let first = volume.get(step).copied().unwrap_or(0.0);
@@ -161,7 +166,7 @@ impl Run {
             first + share * (next - first)
         };
         let errors =
-            places().map(|s| (at(self.time(s, 0.5)) - at(self.time(s, -0.5))) / full - 1.0);
+            places().map(|s| (at(self.time(s + half)) - at(self.time(s - half))) / full - 1.0);
         Laid { errors: errors.collect() }
     }
 }
