@@ -1,5 +1,6 @@
 //! What an operator relies on, event by event.
 
+mod distance;
 mod extruder;
 
 use super::*;

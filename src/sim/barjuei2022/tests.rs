@@ -191,5 +191,5 @@ fn twenty_layers_are_measured_alike_at_every_height() {
         assert!(storey.laid_error_mm.abs() < 0.05, "{storey:?}");
     }
     // The first layer teaches the bead; those above begin with what it taught.
-    assert!(storeys[1..].iter().all(|storey| storey.laid_error_mm.abs() < 0.02), "{storeys:?}");
+    assert!(storeys[1..].iter().all(|storey| storey.laid_error_mm.abs() < 0.03), "{storeys:?}");
 }
