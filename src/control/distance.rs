@@ -115,7 +115,6 @@ pub struct ByDistance {
     offset: OffsetBelief,
     unrest: Unrest,
     trust: Trust,
-    last: Option<DistanceTrace>,
 }
 
 impl ByDistance {
@@ -133,7 +132,6 @@ impl ByDistance {
             ),
             unrest: Unrest::default(),
             trust: Trust::default(),
-            last: None,
         }
     }
 
@@ -145,7 +143,6 @@ impl ByDistance {
         self.level.begin_bead();
         self.offset.begin_bead();
         self.trust = Trust::default();
-        self.last = None;
     }
 
     /// What the robot reported: where the nozzle is, and how fast it moves. The
@@ -166,9 +163,7 @@ impl ByDistance {
             Some(pairing) => self.take(&pairing, nozzle_path.get(), wanted.get()),
             None => Use::NotPaired,
         };
-        let trace = self.trace(taken);
-        self.last = Some(trace);
-        trace
+        self.trace(taken)
     }
 
     /// The law's speed is driven from here on: what is laid now, it answers for.
@@ -215,8 +210,7 @@ impl ByDistance {
     }
 
     fn take(&mut self, pairing: &Pairing, nozzle_path: f64, wanted: f64) -> Use {
-        let drift =
-            self.settings.drift_per_root_m.powi(2) / 1e3 * self.level.way_to(pairing.place_mm);
+        let drift = self.drift_per_mm() * self.level.way_to(pairing.place_mm);
         let swing = self.pulsation.at(pairing.laid_s);
         let (gauge, offset) = (self.settings.gauge.get(), self.settings.offset.get());
         let look = offset_belief::Sight {

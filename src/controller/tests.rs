@@ -43,7 +43,12 @@ struct Line {
 
 impl Line {
     fn new() -> Self {
-        let mut line = Self { controller: Controller::new(setup()), now: 0.0, frame: 0 };
+        Self::of(setup())
+    }
+
+    /// A cell with its link up.
+    fn of(setup: Setup) -> Self {
+        let mut line = Self { controller: Controller::new(setup), now: 0.0, frame: 0 };
         let robot = RobotLimits {
             name: "sim".into(),
             min_mm_per_s: MmPerS::constant(10.0),

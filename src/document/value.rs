@@ -85,23 +85,23 @@ impl<'a> Table<'a> {
             _ => counts.iter().map(usize::to_string).collect::<Vec<_>>().join(" or "),
         };
         let expected = format!("{lengths} numbers in brackets, each {}", expected_number(&range));
-        let Some(value) = self.get(key) else {
-            self.absent(key, expected);
-            return None;
-        };
-        let numbers: Option<Vec<f64>> = value.get_ref().as_array().and_then(|array| {
-            array.iter().map(|v| as_number(v.get_ref()).filter(|n| range.contains(n))).collect()
-        });
-        let row = numbers.filter(|numbers| counts.contains(&numbers.len()));
-        if row.is_none() {
-            self.report(key, shown(value.get_ref()), expected);
-        }
-        row
+        self.array(key, expected, &range, |count| counts.contains(&count))
     }
 
     /// One number or more in brackets, each within the range; they must be there.
     pub fn list(&self, key: &'static str, range: RangeInclusive<f64>) -> Option<Vec<f64>> {
         let expected = format!("one number or more in brackets, each {}", expected_number(&range));
+        self.array(key, expected, &range, |count| count > 0)
+    }
+
+    /// Numbers in brackets, as many as may be, each within the range.
+    fn array(
+        &self,
+        key: &'static str,
+        expected: String,
+        range: &RangeInclusive<f64>,
+        may_be: impl Fn(usize) -> bool,
+    ) -> Option<Vec<f64>> {
         let Some(value) = self.get(key) else {
             self.absent(key, expected);
             return None;
@@ -109,11 +109,11 @@ impl<'a> Table<'a> {
         let numbers: Option<Vec<f64>> = value.get_ref().as_array().and_then(|array| {
             array.iter().map(|v| as_number(v.get_ref()).filter(|n| range.contains(n))).collect()
         });
-        let list = numbers.filter(|numbers| !numbers.is_empty());
-        if list.is_none() {
+        let found = numbers.filter(|numbers| may_be(numbers.len()));
+        if found.is_none() {
             self.report(key, shown(value.get_ref()), expected);
         }
-        list
+        found
     }
 
     /// The same where the key may be absent.

@@ -55,7 +55,6 @@ pub struct Changes {
 pub struct Found {
     before: Level,
     onset_mm: f64,
-    first: usize,
     /// By how much ln A changed.
     pub size: f64,
     /// Variance of that.
@@ -175,14 +174,7 @@ impl Changes {
         let (size, variance) = sums.size();
         let without_two = sums.without_two().sureness(unknown);
         let sure = sums.sureness(unknown);
-        (without_two > SURE_WITHOUT_TWO).then_some(Found {
-            before,
-            onset_mm,
-            first,
-            size,
-            variance,
-            sure,
-        })
+        (without_two > SURE_WITHOUT_TWO).then_some(Found { before, onset_mm, size, variance, sure })
     }
 }
 

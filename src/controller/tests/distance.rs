@@ -33,15 +33,7 @@ struct Cell {
 
 impl Cell {
     fn new(setup: Setup) -> Self {
-        let mut line = Line::new();
-        line.controller = Controller::new(setup);
-        let robot = RobotLimits {
-            name: "sim".into(),
-            min_mm_per_s: MmPerS::constant(10.0),
-            max_mm_per_s: MmPerS::constant(200.0),
-            hold_mm_per_s: MmPerS::constant(80.0),
-        };
-        let _ = line.give(&Event::LinkUp { robot });
+        let line = Line::of(setup);
         let mut cell = Self { line, path: 0.0, speed: 112.5, laid: Vec::new(), tells_path: true };
         let _ = cell.line.robot(RobotMode::Print, 0.0, 112.5);
         cell
