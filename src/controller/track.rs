@@ -28,6 +28,8 @@ impl Controller {
         let own_bead = trace.bead_expected;
         let by_distance = self.distance.as_ref().is_some_and(|law| law.is_ready());
         let by_distance = by_distance && self.fallback.is_none();
+        // A law that has yet to see its first whole gauge of bead is waited for.
+        let by_pi = self.distance.is_none() || self.fallback.is_some();
         match &self.phase {
             Phase::Tracking { by: Steering::Pi { .. }, .. } => {
                 self.track(captured_at, error, trace);
@@ -42,7 +44,7 @@ impl Controller {
             {
                 if by_distance {
                     self.phase = Phase::Tracking { by: Steering::Distance, seen_at: captured_at };
-                } else {
+                } else if by_pi {
                     self.start_tracking(captured_at, error, trace);
                 }
             }

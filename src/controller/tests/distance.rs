@@ -116,3 +116,20 @@ fn another_bead_is_held_from_its_first_millimetre_by_what_the_last_one_taught() 
     let speed = cell.line.tick().unwrap();
     assert!((Cell::width_at(speed) - 42.0).abs() < 0.1, "{speed}");
 }
+
+#[test]
+fn a_bead_that_does_not_fill_the_gauge_yet_is_waited_for() {
+    let mut setup = by_distance();
+    setup.start_length = Mm::ZERO;
+    let mut line = Line::of(setup);
+    line.now = 1.0;
+    let _ = line.robot(RobotMode::Print, 0.0, 112.5);
+    line.now = 1.8;
+    let _ = line.robot(RobotMode::Print, 90.0, 112.5);
+    let step = line.width(38.6);
+    assert_eq!((step.state, step.trace.integral_mm_per_s), (State::Priming, None));
+    line.now = 2.0;
+    let _ = line.robot(RobotMode::Print, 112.5, 112.5);
+    let step = line.width(38.6);
+    assert_eq!((step.state, step.trace.integral_mm_per_s), (State::Tracking, None));
+}
