@@ -11,6 +11,7 @@
 
 mod by_distance;
 mod extrude;
+mod planned;
 mod robot;
 mod track;
 
@@ -47,6 +48,8 @@ pub struct Setup {
     pub start_speed: MmPerS,
     /// Its length.
     pub start_length: Mm,
+    /// Length of every bead, where it is known.
+    pub bead_length: Option<Mm>,
     /// Path length from the nozzle back to the middle of the gauge.
     pub camera_offset: Mm,
     /// How long a robot that hears nothing lays bead before it stops by itself.
@@ -78,6 +81,7 @@ impl Setup {
             limits: run.limits,
             start_speed: run.robot.start_speed,
             start_length: run.robot.start_length,
+            bead_length: run.robot.bead_length,
             camera_offset: run.camera.offset,
             alone_for: Span::from_millis(i64::from(run.robot.valid_ms)) + HOLD_TIME,
             setpoint_period: Span::from_secs(1.0 / run.robot.rate_hz),
@@ -119,6 +123,17 @@ enum Steering {
     Distance,
 }
 
+/// Which part of a bead the robot is at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stretch {
+    /// It has not reached yet the speed that it was told.
+    RunUp,
+    /// It has.
+    Even,
+    /// The extruder was stopped because the bead ends; the robot slows down from then on.
+    Ending,
+}
+
 /// The controller of a cell: the width by the robot's speed and, where the
 /// cell says so, the flow by the extruder.
 #[derive(Debug, Clone, PartialEq)]
@@ -140,8 +155,9 @@ pub struct Controller {
     verdict: Verdict,
     /// Where on the path the bead began.
     bead_start: Mm,
-    /// Whether the robot has reached the speed that it was told on this bead.
-    run_up: bool,
+    /// Beads that were begun.
+    beads: usize,
+    stretch: Stretch,
     /// The last setpoint of this bead, and when it was given.
     told: Option<(Stamp, MmPerS)>,
     limit: Limit,
@@ -165,7 +181,8 @@ impl Controller {
             follow: Follow::default(),
             verdict: Verdict::Follows,
             bead_start: Mm::ZERO,
-            run_up: false,
+            beads: 0,
+            stretch: Stretch::RunUp,
             told: None,
             limit: Limit::None,
         }
@@ -173,7 +190,8 @@ impl Controller {
 
     /// The same with an extruder that is commanded.
     pub fn with_extruder(mut self, setup: ExtruderSetup, demand: FlowDemand) -> Self {
-        self.extruder = Some(ExtruderSide { supervisor: Supervisor::new(setup), demand });
+        let plan = setup.plan.clone();
+        self.extruder = Some(ExtruderSide { supervisor: Supervisor::new(setup), demand, plan });
         self
     }
 
@@ -197,7 +215,7 @@ impl Controller {
         let command = match event {
             Event::Measured { frame, captured_at, width_mm, sigma_mm } => {
                 trace.frame = Some(*frame);
-                self.measured(*captured_at, (*width_mm, *sigma_mm), &mut trace);
+                self.measured((now, *captured_at), (*width_mm, *sigma_mm), &mut trace);
                 None
             }
             Event::Rejected { frame, captured_at, .. } => {
@@ -278,7 +296,7 @@ impl Controller {
         // A hold keeps the speed as it is, whatever flows.
         let speed = match self.phase {
             Phase::Holding { .. } => speed,
-            _ => speed * self.flow_share(),
+            _ => self.paced(now, speed).unwrap_or(kept),
         };
         let (last_at, last) = self.told.unwrap_or((now, speed));
         let limited = self.setup.limits.apply(speed, last, now - last_at);

@@ -26,8 +26,15 @@ use crate::units::Mm;
 pub struct ExtruderSide {
     /// What the controller knows.
     pub setup: ExtruderSetup,
+    /// The files that it is made from.
+    pub files: Vec<ExtruderFile>,
+}
+
+impl ExtruderSide {
     /// The file that its strategy is made from, where there is one.
-    pub file: Option<ExtruderFile>,
+    pub fn file(&self) -> Option<&ExtruderFile> {
+        extruder::of_strategy(&self.files)
+    }
 }
 
 /// A cell, its calibration, and their texts for the recording.
@@ -74,14 +81,14 @@ impl LoadedCell {
     }
 
     /// The extruder side as the controller has it; none where the cell has
-    /// none. Reads the file that the cell names for it.
+    /// none. Reads the files that the cell names for it.
     pub fn extruder(&self) -> anyhow::Result<Option<ExtruderSide>> {
         let Some(run) = &self.cell.run else { return Ok(None) };
         let Some(part) = &run.extruder else { return Ok(None) };
         let cell = self.path.display().to_string();
-        let file = extruder::file(part, &cell)?;
-        let setup = extruder::setup(run, part, &cell, file.as_ref())?;
-        Ok(Some(ExtruderSide { setup, file }))
+        let files = extruder::files(part, &cell)?;
+        let setup = extruder::setup(run, part, &cell, &files)?;
+        Ok(Some(ExtruderSide { setup, files }))
     }
 
     /// What answers the extruder's commands in a simulated cell.
@@ -94,7 +101,7 @@ impl LoadedCell {
             ))
             .into());
         };
-        Ok(SimExtruder::of(plant, self.cell.simulation.seed)?)
+        Ok(SimExtruder::of(plant, self.cell.simulation.seed, part.plant_nominal)?)
     }
 
     /// The extruder side as a simulated cell has it; none where the cell has

@@ -12,6 +12,8 @@ use crate::calib::Calibration;
 use crate::config::Cell;
 use crate::config::cell::{Purpose, RunPart, Source};
 use crate::config::control::WidthLaw;
+use crate::extruder::start_stop::Pause;
+use crate::time::Span;
 use crate::units::Mm;
 
 /// Validates a cell file and all it refers to.
@@ -169,6 +171,9 @@ fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::R
         });
         say!("               which take {:.4} {unit}{pressure} for long", steady.command);
     }
+    if let Some(side) = side {
+        about_ahead(side);
+    }
     if let Some(side) = side
         && let Some(words) = beyond(part, side)?
     {
@@ -185,6 +190,28 @@ fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::R
         );
     }
     Ok(())
+}
+
+/// Tells of what is known ahead: starts, stops and the plan of a job.
+fn about_ahead(side: &ExtruderSide) {
+    if let Some(timing) = &side.setup.timing {
+        let pause = Pause { idle: Span::from_secs(300.0), before: timing.laid().flow };
+        say!(
+            "  starts       the flow comes {:.2} s after the command where the pump stood for 5 min;",
+            timing.start(&pause).first_flow().secs()
+        );
+        say!(
+            "               it stops {:.1} before a bead ends whose length is known",
+            timing.stop().way()
+        );
+    }
+    if let Some(plan) = &side.setup.plan {
+        let (slow, fast) = plan.speeds();
+        let length: f64 = plan.beads().iter().map(|bead| bead.end().get()).sum();
+        let count = plan.beads().len();
+        let beads = if count == 1 { "bead" } else { "beads" };
+        say!("  plan         {count} {beads}, {length:.1} mm, at {slow:.1} to {fast:.1} mm/s");
+    }
 }
 
 /// Tells what the width is held by, where it is held by distance.

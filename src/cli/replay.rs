@@ -81,26 +81,25 @@ fn recorded_controller(recording: &Recording) -> anyhow::Result<Controller> {
     };
     let controller = Controller::new(Setup::of(&cell, &run, &calibration));
     let Some(part) = &run.extruder else { return Ok(controller) };
-    let file = recorded_file(recording, part)?;
+    let files = recorded_files(recording, part)?;
     let cell = format!("cell.toml in {}", recording.file());
-    let setup = extruder::setup(&run, part, &cell, file.as_ref())?;
+    let setup = extruder::setup(&run, part, &cell, &files)?;
     Ok(controller.with_extruder(setup, part.demand))
 }
 
-/// The file that the extruder's strategy is made from, where it has one.
-fn recorded_file(
-    recording: &Recording,
-    part: &ExtruderPart,
-) -> anyhow::Result<Option<ExtruderFile>> {
-    let Some(name) = extruder::attachment(&part.extruder.strategy) else { return Ok(None) };
-    let Some(text) = recording.attachment(name) else {
-        bail!(WrongArguments::new(format!(
-            "{}: the attachment {name} is missing, so the extruder's strategy cannot be set up",
-            recording.file()
-        )));
+/// The files that the extruder side is made from.
+fn recorded_files(recording: &Recording, part: &ExtruderPart) -> anyhow::Result<Vec<ExtruderFile>> {
+    let file = |name| {
+        let Some(text) = recording.attachment(name) else {
+            bail!(WrongArguments::new(format!(
+                "{}: the attachment {name} is missing, so the extruder side cannot be set up",
+                recording.file()
+            )));
+        };
+        let source = format!("{name} in {}", recording.file());
+        Ok(ExtruderFile { name, source, text: text.to_owned() })
     };
-    let source = format!("{name} in {}", recording.file());
-    Ok(Some(ExtruderFile { name, source, text: text.to_owned() }))
+    extruder::attachments(&part.extruder).into_iter().map(file).collect()
 }
 
 fn progress_bar() -> ProgressBar {

@@ -66,7 +66,7 @@ pub fn drive(
 ) -> anyhow::Result<ExitCode> {
     outcome::refuse_a_recording_in(out)?;
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
-    let (extruder, extruder_file) = live_extruder(&loaded, &run)?;
+    let (extruder, extruder_files) = live_extruder(&loaded, &run)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
     let log = RunLog::create(LogOptions {
         folder: out.to_owned(),
@@ -83,7 +83,7 @@ pub fn drive(
         cell_name: loaded.path.display().to_string(),
         cell_text: loaded.text.clone(),
         calibration_text: loaded.calibration_text.clone(),
-        extruder_file,
+        extruder_files,
     };
     let quiet = voice.quiet;
     let report = live::run(LiveRun {
@@ -122,14 +122,14 @@ fn about(
     about
 }
 
-/// The extruder side of a live run and the file behind its strategy; none
+/// The extruder side of a live run and the files behind it; none
 /// where the cell has none. Refuses an extruder that nothing says how to reach.
 fn live_extruder(
     loaded: &LoadedCell,
     run: &RunPart,
-) -> anyhow::Result<(Option<LiveExtruder>, Option<ExtruderFile>)> {
+) -> anyhow::Result<(Option<LiveExtruder>, Vec<ExtruderFile>)> {
     let (Some(part), Some(side)) = (&run.extruder, loaded.extruder()?) else {
-        return Ok((None, None));
+        return Ok((None, Vec::new()));
     };
     let Some(link) = part.extruder.link.clone() else {
         return Err(WrongArguments::new(format!(
@@ -142,5 +142,5 @@ fn live_extruder(
     if let Some(words) = beyond(part, &side)? {
         tell!("warning: {words}");
     }
-    Ok((Some(LiveExtruder { setup: side.setup, demand: part.demand, link }), side.file))
+    Ok((Some(LiveExtruder { setup: side.setup, demand: part.demand, link }), side.files))
 }

@@ -118,7 +118,7 @@ impl SimRecorder {
             cell_name: loaded.path.display().to_string(),
             cell_text: loaded.text.clone(),
             calibration_text: loaded.calibration_text.clone(),
-            extruder_file: loaded.extruder()?.and_then(|side| side.file),
+            extruder_files: loaded.extruder()?.map_or_else(Vec::new, |side| side.files),
         };
         let (recorder, _) = record::start(&config, &args.out)?;
         Ok(Self(Some(recorder.waiting())))

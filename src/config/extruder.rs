@@ -11,11 +11,11 @@ mod readings;
 mod screw;
 mod strategy;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub use link::ExtruderLink;
 pub use part::{Beside, ExtruderPart};
-pub use plant::{ExtruderPlant, LinearPlant, PlantKind, PressurePlant, ScrewPlant};
+pub use plant::{ExtruderPlant, LinearPlant, MeltPlant, PlantKind, PressurePlant, ScrewPlant};
 pub use strategy::{FeedforwardKeys, ModelSource, Strategy};
 
 use crate::document::Table;
@@ -54,6 +54,10 @@ pub struct Extruder {
     pub max_pressure: Option<MPa>,
     /// What readings pass before the strategy sees them.
     pub filters: ReadingFilters,
+    /// The file of its starts and stops, if the cell names one.
+    pub starts: Option<PathBuf>,
+    /// The plan of the job, if the cell names one.
+    pub plan: Option<PathBuf>,
     /// How a live run reaches it, if the file says so.
     pub link: Option<ExtruderLink>,
 }
@@ -139,6 +143,14 @@ impl Extruder {
         }
         let max_pressure = table.optional_number("max_pressure_mpa", 1e-6..=1e4);
         let filters = readings::read(table);
+        let named = |key| table.has(key).then(|| table.text(key)).flatten();
+        let [starts, plan] = ["starts", "plan"].map(|key| named(key).map(|file| folder.join(file)));
+        if plan.is_some()
+            && strategy.as_ref().is_some_and(|known| !matches!(known, Strategy::Feedforward(_)))
+        {
+            let expected = "strategy = \"feedforward\", with the model that was planned with";
+            table.report("plan", "the plan of a job", expected);
+        }
         let link = link::read(table, rates.map(|rates| rates.io_hz));
         Some(Self {
             drive: drive?,
@@ -152,6 +164,8 @@ impl Extruder {
             max_hold: Span::from_secs(max_hold?),
             max_pressure: max_pressure.and_then(|pressure| MPa::new(pressure).ok()),
             filters: filters?,
+            starts,
+            plan,
             link,
         })
     }
@@ -169,7 +183,7 @@ impl Extruder {
     }
 
     /// What the extruder side of a controller has to know, with the law that
-    /// the strategy came to.
+    /// the strategy came to; without what other files tell of starts and of a job.
     pub fn setup(&self, law: Law) -> ExtruderSetup {
         let period = |hz: f64| Span::from_secs(1.0 / hz);
         ExtruderSetup {
@@ -184,6 +198,8 @@ impl Extruder {
             max_pressure: self.max_pressure,
             filters: self.filters,
             robot_follows: self.robot_follows,
+            timing: None,
+            plan: None,
         }
     }
 }

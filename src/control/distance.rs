@@ -16,6 +16,7 @@
 //! standard deviation and from how much the flow is said to drift.
 
 mod change;
+mod colour;
 mod level;
 mod offset_belief;
 mod pairing;
@@ -33,7 +34,8 @@ use crate::time::{Span, Stamp};
 use crate::units::{Mm, MmPerS};
 
 use change::Changes;
-use level::Level;
+use colour::Colour;
+use level::{Level, Surprise};
 use offset_belief::OffsetBelief;
 use pairing::{Pairing, Unrest};
 use pulsation::Pulsation;
@@ -114,6 +116,7 @@ pub struct ByDistance {
     pulsation: Pulsation,
     offset: OffsetBelief,
     unrest: Unrest,
+    colour: Colour,
     trust: Trust,
 }
 
@@ -131,6 +134,7 @@ impl ByDistance {
                 settings.offset_sigma / settings.offset.max(Mm::constant(1.0)),
             ),
             unrest: Unrest::default(),
+            colour: Colour::new(settings.gauge.get()),
             trust: Trust::default(),
         }
     }
@@ -142,6 +146,7 @@ impl ByDistance {
         self.changes.clear();
         self.level.begin_bead();
         self.offset.begin_bead();
+        self.colour.begin_anew();
         self.trust = Trust::default();
     }
 
@@ -201,15 +206,13 @@ impl ByDistance {
         let place = nozzle_path - offset * self.offset.factor();
         let doubt = DOUBTS * self.offset.sigma() * offset;
         let exponent = self.level.exponent();
-        Pairing::of(
-            &self.trail,
-            (place, self.settings.gauge.get()),
-            (width, sigma),
-            (doubt, exponent),
-        )
+        let gauge = self.settings.gauge.get();
+        Pairing::of(&self.trail, (place, gauge), (width, sigma), (doubt, exponent))
     }
 
-    fn take(&mut self, pairing: &Pairing, nozzle_path: f64, wanted: f64) -> Use {
+    fn take(&mut self, seen: &Pairing, nozzle_path: f64, wanted: f64) -> Use {
+        // As much less as widths that hang together say.
+        let pairing = &Pairing { noise: seen.noise * self.colour.inflation(), ..*seen };
         let drift = self.drift_per_mm() * self.level.way_to(pairing.place_mm);
         let swing = self.pulsation.at(pairing.laid_s);
         let (gauge, offset) = (self.settings.gauge.get(), self.settings.offset.get());
@@ -226,7 +229,8 @@ impl ByDistance {
         self.level.move_to(pairing.place_mm, drift);
         let spread = self.level.spread(pairing.ln_speed);
         let plain = pairing.ln_width + self.level.exponent() * pairing.ln_speed;
-        self.pulsation.take(pairing.laid_s, plain, pairing.variance() + UNSURE * spread, drift);
+        let hanging = seen.noise * self.colour.hanging() + seen.doubt * seen.doubt;
+        self.pulsation.take(pairing.laid_s, plain, hanging + UNSURE * spread, drift);
         self.weigh(pairing, pairing.ln_width - swing, (libm::log(wanted.max(1e-3)), drift))
     }
 
@@ -236,6 +240,11 @@ impl ByDistance {
         let sight = self.changes.sight(pairing, ln_width);
         let surprise = self.level.surprise(&sight);
         let calm = self.unrest.is_calm();
+        if !(calm && surprise.is_far()) {
+            let hangs = pairing.variance() * (1.0 - 1.0 / self.colour.inflation());
+            let alone = Surprise { variance: surprise.variance - hangs, ..surprise };
+            self.colour.note(pairing.place_mm, alone);
+        }
         self.changes.push(pairing, ln_width, before, calm);
         self.unrest.note(pairing.laid_s, surprise, pairing.variance() / surprise.variance);
         self.trust.note(pairing, surprise, ln_wanted, drift);
@@ -247,6 +256,7 @@ impl ByDistance {
             return if outlier { Use::Outlier } else { Use::Taken };
         };
         self.trust.begin_anew();
+        self.colour.begin_anew();
         self.pulsation.shift(found.size, found.variance);
         self.level = found.level_after(pairing.place_mm, self.drift_per_mm());
         Use::Change

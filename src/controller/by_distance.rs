@@ -8,7 +8,7 @@ use crate::units::{Mm, MmPerS};
 
 /// Time that a robot's speed takes to follow: one over the angular frequency
 /// of a loop of 10 Hz, as the 2022 paper has it.
-const ROBOT_LAG: Span = Span::from_millis(16);
+pub(super) const ROBOT_LAG: Span = Span::from_millis(16);
 
 impl Controller {
     /// Begins to track as soon as the first stretch is over and the law knows
@@ -36,7 +36,7 @@ impl Controller {
     }
 
     /// The nozzle's path since the bead began.
-    fn nozzle(&self, now: Stamp) -> Option<Mm> {
+    pub(super) fn nozzle(&self, now: Stamp) -> Option<Mm> {
         self.transport.path_at(now).map(|path| path - self.bead_start)
     }
 

@@ -1,9 +1,12 @@
 //! The extruder side of a controller: what it hears of the robot's, and what
 //! it answers.
 
-use super::{Controller, Phase};
+use std::sync::Arc;
+
+use super::{Controller, Phase, Stretch};
 use crate::control::{Event, ExtruderStep, Hold};
 use crate::extruder::{ExtruderFault, ExtruderState, FlowDemand, Laying, Supervisor};
+use crate::plan::PlannedJob;
 use crate::time::Stamp;
 
 /// The extruder side of a controller, where a cell has one.
@@ -11,12 +14,18 @@ use crate::time::Stamp;
 pub(super) struct ExtruderSide {
     pub(super) supervisor: Supervisor,
     pub(super) demand: FlowDemand,
+    /// The job that was planned, if there is one.
+    pub(super) plan: Option<Arc<PlannedJob>>,
 }
 
 impl Controller {
     /// The extruder side's answer to what concerns it.
     pub(super) fn extrude(&mut self, now: Stamp, event: &Event) -> Option<ExtruderStep> {
         let laying = self.laying(now);
+        if matches!(laying, Laying::Ending(_)) {
+            self.stretch = Stretch::Ending;
+        }
+        let planned = self.planned(now).map(|planned| planned.command);
         let ExtruderSide { supervisor, .. } = self.extruder.as_mut()?;
         let command = match event {
             Event::Extruder(report) => {
@@ -31,7 +40,10 @@ impl Controller {
                 supervisor.link_went_down(now);
                 None
             }
-            Event::ExtruderTick => supervisor.tick(now, laying),
+            Event::ExtruderTick => {
+                supervisor.plan(planned);
+                supervisor.tick(now, laying)
+            }
             Event::Stop => supervisor.stop(),
             _ => return None,
         };
@@ -40,7 +52,9 @@ impl Controller {
 
     /// What the extruder side has to know of the robot's.
     fn laying(&self, now: Stamp) -> Laying {
-        let Some(ExtruderSide { demand, .. }) = &self.extruder else { return Laying::Idle };
+        let Some(ExtruderSide { demand, supervisor, .. }) = &self.extruder else {
+            return Laying::Idle;
+        };
         match &self.phase {
             Phase::Idle => Laying::Idle,
             Phase::Fault { .. } => Laying::Stopped,
@@ -56,17 +70,16 @@ impl Controller {
                 let told = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
                 // No extruder keeps up with a robot that starts; it is ready for
                 // the speed that comes.
-                let robot = self.robot.filter(|_| self.run_up);
+                let robot = self.robot.filter(|_| self.stretch != Stretch::RunUp);
                 let robot = robot.map(|robot| (told, robot.speed_mm_per_s));
-                Laying::Bead(demand.wanted(robot))
+                let flow =
+                    self.planned(now).map_or_else(|| demand.wanted(robot), |planned| planned.flow);
+                let way = supervisor.way_of_stop(told);
+                let stops = self.stretch == Stretch::Ending
+                    || self.left(now).zip(way).is_some_and(|(left, way)| left <= way);
+                if stops { Laying::Ending(flow) } else { Laying::Bead(flow) }
             }
         }
-    }
-
-    /// Share of the width controller's speed that the flow at the nozzle
-    /// allows; 1 where the robot does not go by it.
-    pub(super) fn flow_share(&self) -> f64 {
-        self.extruder.as_ref().map_or(1.0, |side| side.supervisor.robot_share())
     }
 
     pub(super) fn extruder_fault(&self) -> Option<ExtruderFault> {

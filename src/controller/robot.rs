@@ -1,6 +1,6 @@
 //! What the robot reports: its mode, its path and how it follows its speed.
 
-use super::{Controller, Phase};
+use super::{Controller, Phase, Stretch};
 use crate::control::follow::Verdict;
 use crate::control::{Fault, Hold, Limit, RobotLimits, RobotMode, RobotState};
 use crate::time::Stamp;
@@ -30,7 +30,7 @@ impl Controller {
 
     fn become_idle(&mut self) {
         self.phase = Phase::Idle;
-        self.run_up = false;
+        self.stretch = Stretch::RunUp;
         self.told = None;
         self.limit = Limit::None;
         self.follow.reset();
@@ -55,17 +55,20 @@ impl Controller {
             self.bead_start = state.path_mm;
             self.phase = Phase::Priming;
             self.fallback = None;
+            self.beads += 1;
             if let Some(law) = &mut self.distance {
                 law.begin_bead();
             }
         }
-        let share = self.flow_share();
+        let share = self.flow_share(now);
         if let Some(law) = &mut self.distance {
             law.reported(now, state.path_mm, state.speed_mm_per_s, share);
         }
         self.distrust();
         let told = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
-        self.run_up |= state.speed_mm_per_s >= told * RUN_UP;
+        if self.stretch == Stretch::RunUp && state.speed_mm_per_s >= told * RUN_UP {
+            self.stretch = Stretch::Even;
+        }
         if let Some((_, told)) = self.told {
             self.verdict = self.follow.observe(now, told, state.speed_mm_per_s);
         }

@@ -26,6 +26,7 @@ pub fn setup() -> Setup {
             max_accel: MmPerS2::constant(2000.0),
         },
         start_speed: MmPerS::constant(112.5),
+        bead_length: None,
         start_length: Mm::constant(200.0),
         camera_offset: Mm::constant(88.4),
         alone_for: Span::from_millis(1600),

@@ -14,7 +14,7 @@ const LEAST_SHARE: f64 = 0.5;
 impl Controller {
     pub(super) fn measured(
         &mut self,
-        captured_at: Stamp,
+        (now, captured_at): (Stamp, Stamp),
         (width, sigma): (Mm, Mm),
         trace: &mut Trace,
     ) {
@@ -32,20 +32,20 @@ impl Controller {
         let by_pi = self.distance.is_none() || self.fallback.is_some();
         match &self.phase {
             Phase::Tracking { by: Steering::Pi { .. }, .. } => {
-                self.track(captured_at, error, trace);
+                self.track((now, captured_at), error, trace);
             }
             Phase::Tracking { by: Steering::Distance, seen_at } if by_distance => {
                 let seen_at = captured_at.max(*seen_at);
                 self.phase = Phase::Tracking { by: Steering::Distance, seen_at };
             }
-            Phase::Tracking { .. } => self.start_tracking(captured_at, error, trace),
+            Phase::Tracking { .. } => self.start_tracking((now, captured_at), error, trace),
             Phase::Priming | Phase::Holding { why: Hold::NoWidth, .. }
                 if primed && own_bead && !self.ended =>
             {
                 if by_distance {
                     self.phase = Phase::Tracking { by: Steering::Distance, seen_at: captured_at };
                 } else if by_pi {
-                    self.start_tracking(captured_at, error, trace);
+                    self.start_tracking((now, captured_at), error, trace);
                 }
             }
             _ => {}
@@ -80,11 +80,12 @@ impl Controller {
             && trace.bead_path_mm.is_some_and(|path| path >= self.bead_start);
     }
 
-    fn start_tracking(&mut self, captured_at: Stamp, error: Mm, trace: &mut Trace) {
-        let driven = self.robot.map_or(self.setup.start_speed, |robot| robot.speed_mm_per_s);
-        // A robot that goes by the flow is slower or faster than the law says.
-        let share = self.flow_share().max(LEAST_SHARE);
-        let own = driven * (1.0 / share);
+    fn start_tracking(&mut self, (now, captured_at): (Stamp, Stamp), error: Mm, trace: &mut Trace) {
+        let start_speed = self.setup.start_speed;
+        let driven = self.robot.map_or(start_speed, |robot| robot.speed_mm_per_s);
+        // A robot that goes by the flow or by a plan is slower or faster than the law says.
+        let paced = self.paced(now, start_speed).unwrap_or(start_speed);
+        let own = driven * (1.0 / (paced / start_speed).max(LEAST_SHARE));
         let mut pi = Pi::start_bumpless(self.setup.gains(), own, error);
         let demand = pi.step(error, Span::ZERO, Saturation::None);
         trace.note(&demand);
@@ -93,7 +94,7 @@ impl Controller {
         self.phase = Phase::Tracking { by, seen_at: captured_at };
     }
 
-    fn track(&mut self, captured_at: Stamp, error: Mm, trace: &mut Trace) {
+    fn track(&mut self, (now, captured_at): (Stamp, Stamp), error: Mm, trace: &mut Trace) {
         let saturation = self.saturation();
         let max_gap = self.setup.control.max_gap;
         let Phase::Tracking { by: Steering::Pi { pi, demand }, seen_at } = &mut self.phase else {
@@ -104,7 +105,7 @@ impl Controller {
             return;
         }
         if dt > max_gap {
-            self.start_tracking(captured_at, error, trace);
+            self.start_tracking((now, captured_at), error, trace);
             return;
         }
         let wanted = pi.step(error, dt, saturation);

@@ -98,6 +98,21 @@ pub trait Strategy {
     /// that time.
     fn resume(&mut self, now: Stamp, applied: f64);
 
+    /// A start is over, through which one command was kept: the flow that belongs to it
+    /// has come.
+    fn flows(&mut self, now: Stamp, applied: f64) {
+        self.settle(now, applied);
+    }
+
+    /// The command that was planned beforehand for this moment of the job; none without
+    /// a plan. Laws that have no model leave it alone.
+    fn plan(&mut self, _command: Option<f64>) {}
+
+    /// Whether the flow has come and the plan is followed.
+    fn is_on_plan(&self) -> bool {
+        false
+    }
+
     /// The flow that will leave the nozzle, for a robot that goes by it; none
     /// where the law knows none.
     fn foretold(&self) -> Option<Mm3PerS> {

@@ -56,6 +56,8 @@ pub enum ExtruderState {
     Running,
     /// The last command is kept.
     Holding(ExtruderHold),
+    /// The pump was told to stop before the bead ends; what still comes fills the rest.
+    Ending,
     /// The pump was told to stop. Left when the robot is idle again, unless the
     /// fault says more.
     Fault(ExtruderFault),
@@ -69,6 +71,7 @@ impl ExtruderState {
             Self::Starting => "starting",
             Self::Running => "running",
             Self::Holding(_) => "holding",
+            Self::Ending => "ending",
             Self::Fault(_) => "fault",
         }
     }

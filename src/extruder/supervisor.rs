@@ -4,24 +4,32 @@
 //!
 //! - off: no bead is laid.
 //! - starting: the pump was told to run; the law stands where it begins.
-//! - running: the law commands, within its limits.
+//! - running: the law commands, within its limits; while the flow of a start still
+//!   comes, where the cell knows that of its extruder, the law stands.
 //! - holding: the last command is kept, for a reason; left when the reason
 //!   goes, and a fault when it stays too long.
+//! - ending: the pump was stopped early, and what still comes fills the rest of the bead.
 //! - fault: the pump is stopped; left when the robot is idle again, and where
 //!   the pump runs on all the same, not before it says that it stops.
 
+mod pause;
 mod watch;
+
+use std::sync::Arc;
 
 use super::law::{Law, Wish};
 use super::limits::{CommandLimit, CommandLimits};
 use super::rates::Rate;
 use super::readings::{ReadingFilters, Readings};
 use super::report::{ExtruderCommand, ExtruderReport};
+use super::start_stop::Timing;
 use super::state::{ExtruderFault, ExtruderHold, ExtruderState, ExtruderTrace};
 use super::{Drive, RobotFollows};
 use crate::control::follow::Follow;
+use crate::plan::PlannedJob;
 use crate::time::{Span, Stamp};
-use crate::units::{MPa, Mm3PerS};
+use crate::units::{MPa, Mm, Mm3PerS, MmPerS};
+use pause::{Pauses, Shares};
 
 /// Most by which a robot that follows the flow is quickened.
 const MOST_SHARE: f64 = 1.5;
@@ -51,6 +59,10 @@ pub struct ExtruderSetup {
     pub filters: ReadingFilters,
     /// What the robot's speed goes by besides the width.
     pub robot_follows: RobotFollows,
+    /// How it starts and stops, if that is known.
+    pub timing: Option<Timing>,
+    /// The job that robot and extruder were planned for together, if there is one.
+    pub plan: Option<Arc<PlannedJob>>,
 }
 
 /// What the robot's side says at a tick.
@@ -58,6 +70,9 @@ pub struct ExtruderSetup {
 pub enum Laying {
     /// Bead is being laid, and this flow is wanted at the nozzle.
     Bead(Mm3PerS),
+    /// So little bead is left that what still comes of a pump that stops fills it; until
+    /// then this flow was wanted.
+    Ending(Mm3PerS),
     /// The robot stopped where it should lay bead, or is being stopped.
     Stopped,
     /// Nothing is being done.
@@ -70,6 +85,7 @@ enum Phase {
     Starting { since: Stamp },
     Running,
     Holding { since: Stamp, why: ExtruderHold },
+    Ending,
     Fault(ExtruderFault),
 }
 
@@ -118,6 +134,10 @@ pub struct Supervisor {
     relieving: bool,
     /// The last command that went out.
     told: Option<ExtruderCommand>,
+    /// Starts and stops, where the cell knows them.
+    pauses: Option<Pauses>,
+    /// What they make of the last tick.
+    shares: Option<Shares>,
     trace: ExtruderTrace,
 }
 
@@ -129,6 +149,8 @@ impl Supervisor {
             control: Rate::every(setup.control_period),
             applied: setup.limits.idle(),
             readings: Readings::new(setup.filters),
+            pauses: setup.timing.map(Pauses::new),
+            shares: None,
             setup,
             phase: Phase::Off,
             link_up: false,
@@ -154,6 +176,7 @@ impl Supervisor {
             Phase::Starting { .. } => ExtruderState::Starting,
             Phase::Running => ExtruderState::Running,
             Phase::Holding { why, .. } => ExtruderState::Holding(why),
+            Phase::Ending => ExtruderState::Ending,
             Phase::Fault(why) => ExtruderState::Fault(why),
         }
     }
@@ -163,10 +186,37 @@ impl Supervisor {
         self.trace
     }
 
-    /// Share of its speed at which a robot that follows the flow is to move:
-    /// the flow that is foretold over the one that is wanted; 1 where the robot
+    /// Share of its speed at which the robot is to move: in a start and in a stop
+    /// that which belongs to it, else for a robot that follows the flow the
+    /// flow that is foretold over the one that is wanted; 1 where the robot
     /// does not follow, or nothing is known of the flow.
     pub fn robot_share(&self) -> f64 {
+        self.shares.map_or_else(|| self.foretold_share(), |shares| shares.robot)
+    }
+
+    /// The flow at the nozzle over the one that is wanted, by which the bead that is
+    /// laid is wider than the speed alone tells; 1 where nothing is known of it.
+    pub fn flow_share(&self) -> f64 {
+        self.shares.map_or_else(|| self.foretold_share(), |shares| shares.flow)
+    }
+
+    /// How far from the end of a bead that is laid at this speed the pump is to stop;
+    /// none where nothing is known of stops.
+    pub fn way_of_stop(&self, speed: MmPerS) -> Option<Mm> {
+        self.pauses.as_ref().map(|pauses| pauses.way(speed))
+    }
+
+    /// The command that was planned for where the nozzle is now, which the law gives once
+    /// the flow has come; none without a plan.
+    pub fn plan(&mut self, command: Option<f64>) {
+        self.setup.law.strategy_mut().plan(command);
+    }
+
+    fn foretold_share(&self) -> f64 {
+        // The plan has foreseen how robot and flow go together.
+        if self.setup.law.strategy().is_on_plan() {
+            return 1.0;
+        }
         let wanted = self.trace.flow_mm3_per_s;
         match (self.setup.robot_follows, self.trace.foretold_mm3_per_s) {
             (RobotFollows::Flow, Some(foretold)) if wanted > Mm3PerS::ZERO => {
@@ -198,14 +248,19 @@ impl Supervisor {
         match laying {
             Laying::Bead(_) if self.obedience.is_lost() => {}
             Laying::Bead(flow) => self.lay(now, dt, flow),
+            Laying::Ending(flow) => self.run_out(now, flow),
             Laying::Stopped if matches!(self.phase, Phase::Fault(_)) => {}
             Laying::Stopped | Laying::Idle => self.rest(),
         }
         let command = self.command();
-        let stops = self.told.is_some_and(|told| told.pump_on) && !command.pump_on;
+        let ran = self.told.is_some_and(|told| told.pump_on);
+        let stops = ran && !command.pump_on;
         // Nothing is sent on a connection before it is known what the pump does.
         if !(self.io.due(now) || stops) || !self.link_up || self.report.is_none() {
             return None;
+        }
+        if let Some(pauses) = self.pauses.as_mut().filter(|_| ran != command.pump_on) {
+            pauses.turned(now, command.pump_on);
         }
         self.told = Some(command);
         self.told
@@ -222,10 +277,12 @@ impl Supervisor {
     }
 
     fn command(&self) -> ExtruderCommand {
-        let on = !matches!(self.phase, Phase::Off | Phase::Fault(_));
+        let on = !matches!(self.phase, Phase::Off | Phase::Ending | Phase::Fault(_));
         let value = if on { self.applied } else { self.setup.limits.idle() };
-        // A valve that shuts on too high a pressure keeps it in.
-        ExtruderCommand { pump_on: on, valve_open: on || self.relieving, value }
+        // A valve that shuts on too high a pressure keeps it in, and one that shuts before
+        // the end of a bead what was to fill it.
+        let open = on || self.relieving || self.phase == Phase::Ending;
+        ExtruderCommand { pump_on: on, valve_open: open, value }
     }
 
     fn rest(&mut self) {
@@ -234,15 +291,41 @@ impl Supervisor {
         self.controlled = None;
         self.follow.reset();
         self.trace = ExtruderTrace::default();
+        self.shares = None;
+        if let Some(pauses) = &mut self.pauses {
+            pauses.rest();
+        }
+    }
+
+    /// Stops the pump early.
+    fn run_out(&mut self, now: Stamp, flow: Mm3PerS) {
+        let Some(pauses) = &mut self.pauses else { return };
+        match self.phase {
+            Phase::Off | Phase::Fault(_) => return,
+            Phase::Ending => {}
+            Phase::Starting { .. } | Phase::Running | Phase::Holding { .. } => {
+                pauses.end(now);
+                self.phase = Phase::Ending;
+                self.follow.reset();
+            }
+        }
+        self.shares = pauses.shares(now);
+        self.trace = ExtruderTrace { flow_mm3_per_s: flow, ..ExtruderTrace::default() };
+        self.trace.foretold_mm3_per_s = self.shares.map(|shares| flow * shares.flow);
     }
 
     fn lay(&mut self, now: Stamp, dt: Span, flow: Mm3PerS) {
+        if self.phase == Phase::Ending {
+            self.rest();
+        }
         self.trace.flow_mm3_per_s = flow;
         if self.phase == Phase::Off {
             self.begin(now, flow);
         }
         self.lose_patience(now);
+        self.rise(now, flow);
         match self.phase {
+            Phase::Running if self.shares.is_some() => {}
             Phase::Running => self.drive(now, dt, flow),
             Phase::Holding { why, .. } => {
                 self.setup.law.strategy_mut().wait(dt);
@@ -251,9 +334,24 @@ impl Supervisor {
                     self.resume(now);
                 }
             }
-            Phase::Off | Phase::Starting { .. } | Phase::Fault(_) => {}
+            Phase::Off | Phase::Starting { .. } | Phase::Ending | Phase::Fault(_) => {}
         }
-        self.trace.foretold_mm3_per_s = self.setup.law.strategy().foretold();
+        self.trace.foretold_mm3_per_s = match self.shares {
+            Some(shares) => Some(flow * shares.flow),
+            None => self.setup.law.strategy().foretold(),
+        };
+    }
+
+    /// Where the flow of a start is by now. While it comes the law stands: what is told
+    /// of starts is told of a steady command.
+    fn rise(&mut self, now: Stamp, flow: Mm3PerS) {
+        let Some(pauses) = &mut self.pauses else { return };
+        pauses.want(flow);
+        let rises = pauses.shares(now);
+        if rises.is_none() && self.shares.is_some() {
+            self.setup.law.strategy_mut().flows(now, self.applied);
+        }
+        self.shares = rises;
     }
 
     /// Begins a bead. Its first command is no change of another and has no
@@ -261,6 +359,9 @@ impl Supervisor {
     fn begin(&mut self, now: Stamp, flow: Mm3PerS) {
         self.phase = Phase::Starting { since: now };
         self.begun = now;
+        if let Some(pauses) = &mut self.pauses {
+            pauses.begin(now);
+        }
         self.stand(now, flow);
     }
 

@@ -57,15 +57,14 @@ pub struct RecordConfig {
     pub cell_text: String,
     /// The calibration file's text, where the cell has one.
     pub calibration_text: Option<String>,
-    /// The file that the cell names for its extruder, where there is one.
-    pub extruder_file: Option<ExtruderFile>,
+    /// The files that the cell names for its extruder.
+    pub extruder_files: Vec<ExtruderFile>,
 }
 
-/// A file that the strategy of an extruder is made from.
+/// A file that the extruder side of a controller is made from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ExtruderFile {
-    /// What it is called in a recording: [`format::MODEL_ATTACHMENT`] or
-    /// [`format::PROFILE_ATTACHMENT`].
+    /// What it is called in a recording, such as [`format::MODEL_ATTACHMENT`].
     pub name: &'static str,
     /// What messages call it.
     pub source: String,
@@ -188,11 +187,11 @@ fn start_with<S: Sink + 'static>(
         epoch_ns: config.epoch_ns,
         cell_name: config.cell_name.clone(),
     };
-    let extruder_file = config.extruder_file.as_ref().map(|file| (file.name, file.text.as_str()));
+    let extruder_files = config.extruder_files.iter().map(|file| (file.name, file.text.as_str()));
     let mut attachments = vec![(CELL_ATTACHMENT, config.cell_text.as_str())];
     attachments
         .extend(config.calibration_text.as_deref().map(|text| (CALIBRATION_ATTACHMENT, text)));
-    attachments.extend(extruder_file);
+    attachments.extend(extruder_files);
     let mut mux = Mux::new(&run, &attachments).map_err(|error| RecordError(error.to_string()))?;
     let path = sink.path().to_path_buf();
     let mut outlet = Outlet::new(sink);

@@ -245,6 +245,31 @@ impl<K: Recorder> SimCell<K> {
         }
     }
 
+    /// Lets the robot stand, and with it the pump, until the next layer.
+    pub fn rest(&mut self, lasts: Span, witness: &mut impl Witness) {
+        let mut clock = Ticker::new(&self.cell, &self.run, self.now, self.layers);
+        let until = self.now + lasts;
+        loop {
+            let (at, what) = clock.next();
+            if at >= until {
+                self.now = until;
+                return;
+            }
+            self.now = at;
+            match what {
+                What::Report => {
+                    let state = self.runner.robot_mut().state(at);
+                    self.tell(&Event::Robot(state), witness);
+                }
+                What::ExtruderReport => self.extruder_reports(witness),
+                What::ExtruderTick => {
+                    let _ = self.tell(&Event::ExtruderTick, witness);
+                }
+                What::Frame | What::Tick => {}
+            }
+        }
+    }
+
     fn tell(&mut self, event: &Event, witness: &mut impl Witness) -> Handled {
         let handled = self.runner.handle(self.now, event);
         witness.step(self.now, event, &handled.step);
@@ -364,3 +389,6 @@ struct Arrival {
 
 /// Keeps the phase of the pulsation apart from other random numbers of a seed.
 const PULSE: u64 = 0x0070_756c_7365;
+
+#[cfg(test)]
+mod tests;

@@ -10,10 +10,12 @@ use crate::units::Mm3PerS;
 
 mod filled;
 mod linear;
+mod molten;
 mod pressed;
 
 pub use filled::Filled;
 pub use linear::Linear;
+pub use molten::Molten;
 pub use pressed::Pressed;
 
 /// Step of a simulated plant.
@@ -87,15 +89,16 @@ impl SimExtruder {
         Self { plant, delays, pump, valve, value: 0.0, now: Stamp::START }
     }
 
-    /// As a cell describes it; the seed is that of everything random. Fails
-    /// where a transfer function cannot be put on the grid of [`STEP`].
-    pub fn of(plant: &ExtruderPlant, seed: u64) -> Result<Self, ModelError> {
+    /// As a cell describes it; the seed is that of everything random, and `usual` the
+    /// flow of the cell's bead. Fails where a transfer function cannot be put on the grid of [`STEP`].
+    pub fn of(plant: &ExtruderPlant, seed: u64, usual: Mm3PerS) -> Result<Self, ModelError> {
         let delays =
             Delays { start: plant.start_delay, stop: plant.stop_delay, valve: plant.valve_delay };
         let kind: Box<dyn Plant> = match &plant.kind {
             PlantKind::Linear(linear) => Box::new(Linear::new(linear, seed)?),
             PlantKind::Pressure(pressure) => Box::new(Pressed::new(pressure, seed)),
             PlantKind::Screw(screw) => Box::new(Filled::new(screw, seed)),
+            PlantKind::Melt(melt) => Box::new(Molten::new(melt, seed, usual)),
         };
         Ok(Self::new(kind, delays))
     }

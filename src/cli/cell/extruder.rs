@@ -1,11 +1,14 @@
 //! The strategy of an extruder from its cell and the file that the cell names:
 //! from the disk for a run, from the recording for a replay.
 
+mod job;
+mod starts;
+
 use std::fs;
 
 use crate::cli::WrongArguments;
 use crate::config::cell::{ExtruderPart, RunPart};
-use crate::config::extruder::{FeedforwardKeys, ModelSource, Strategy};
+use crate::config::extruder::{Extruder, FeedforwardKeys, ModelSource, Strategy};
 use crate::extruder::feedforward::{
     ExtruderModel, FeedforwardError, FlowForecast, InverseSettings, ScrewSpeed, Tracker,
 };
@@ -18,7 +21,9 @@ use crate::identify::quantity::Unit;
 use crate::identify::{file as model, profile};
 use crate::io::model_file;
 use crate::io::record::ExtruderFile;
-use crate::io::record::format::{MODEL_ATTACHMENT, PROFILE_ATTACHMENT};
+use crate::io::record::format::{
+    MODEL_ATTACHMENT, PLAN_ATTACHMENT, PROFILE_ATTACHMENT, STARTS_ATTACHMENT,
+};
 use crate::model::TransferFunction;
 use crate::offline::recorded::COMMAND;
 use crate::time::Span;
@@ -26,14 +31,44 @@ use crate::units::Rpm;
 
 const WITHOUT_FILE: &str = "found a strategy without its file";
 
+/// What the files that an extruder side is made from are called in a recording.
+pub fn attachments(extruder: &Extruder) -> Vec<&'static str> {
+    let starts = extruder.starts.as_ref().map(|_| STARTS_ATTACHMENT);
+    let plan = extruder.plan.as_ref().map(|_| PLAN_ATTACHMENT);
+    [attachment(&extruder.strategy), starts, plan].into_iter().flatten().collect()
+}
+
 /// What the strategy's file is called in a recording; none where it has none.
-pub fn attachment(strategy: &Strategy) -> Option<&'static str> {
+fn attachment(strategy: &Strategy) -> Option<&'static str> {
     match strategy {
         Strategy::Profile { .. } => Some(PROFILE_ATTACHMENT),
         Strategy::Feedforward(FeedforwardKeys { model: ModelSource::Screw(_), .. }) => None,
         Strategy::Feedforward(_) => Some(MODEL_ATTACHMENT),
         _ => None,
     }
+}
+
+/// The file of the strategy among those of an extruder side.
+pub fn of_strategy(files: &[ExtruderFile]) -> Option<&ExtruderFile> {
+    files.iter().find(|file| [MODEL_ATTACHMENT, PROFILE_ATTACHMENT].contains(&file.name))
+}
+
+/// Reads the files that the cell names for its extruder. `cell` is what messages call
+/// the cell.
+pub fn files(part: &ExtruderPart, cell: &str) -> anyhow::Result<Vec<ExtruderFile>> {
+    let mut files: Vec<ExtruderFile> = file(part, cell)?.into_iter().collect();
+    for (name, what, makes, path) in [
+        (STARTS_ATTACHMENT, "starts", "identify --starts", &part.extruder.starts),
+        (PLAN_ATTACHMENT, "plan", "plan", &part.extruder.plan),
+    ] {
+        let Some(path) = path else { continue };
+        let source = format!("{what} {}", path.display());
+        let text = fs::read_to_string(path).map_err(|error| {
+            WrongArguments::new(format!("{source}: {error}; `truebead {makes}` makes one"))
+        })?;
+        files.push(ExtruderFile { name, source, text });
+    }
+    Ok(files)
 }
 
 /// Reads the file that the cell names for its extruder; of a library the model
@@ -69,14 +104,15 @@ pub fn file(part: &ExtruderPart, cell: &str) -> anyhow::Result<Option<ExtruderFi
     Ok(Some(ExtruderFile { name, source, text }))
 }
 
-/// What the extruder side of a controller has to know, with the file that its
-/// strategy is made from. `cell` is what messages call the cell.
+/// What the extruder side of a controller has to know, with the files that it is
+/// made from. `cell` is what messages call the cell.
 pub fn setup(
     run: &RunPart,
     part: &ExtruderPart,
     cell: &str,
-    file: Option<&ExtruderFile>,
+    files: &[ExtruderFile],
 ) -> anyhow::Result<ExtruderSetup> {
+    let file = of_strategy(files);
     let needed = || file.ok_or_else(|| wrong(cell, WITHOUT_FILE));
     let law = match &part.extruder.strategy {
         Strategy::Constant { value } => Law::Constant(Constant(*value)),
@@ -89,7 +125,14 @@ pub fn setup(
         Strategy::Screw(settings) => Law::Screw(ScrewFill::new(settings)?),
         Strategy::Adaptive(parts) => Law::Adaptive(AdaptiveNozzle::new(parts.0, parts.1)),
     };
-    Ok(part.extruder.setup(law))
+    let named = |name| files.iter().find(|file| file.name == name);
+    let plan = named(PLAN_ATTACHMENT).map(|file| job::plan(run, part, file)).transpose()?;
+    let starts = named(STARTS_ATTACHMENT);
+    let timing = starts.map(|file| starts::timing(run, part, file)).transpose()?;
+    if let Some(timing) = &timing {
+        starts::has_room(run, plan.as_deref(), timing, cell)?;
+    }
+    Ok(ExtruderSetup { timing, plan, ..part.extruder.setup(law) })
 }
 
 /// How the extruder of a cell behaves about its operating point, from the command to

@@ -24,7 +24,7 @@ pub fn steady(part: &ExtruderPart, side: &ExtruderSide) -> anyhow::Result<Option
     let flow = part.demand.nominal();
     match &part.extruder.strategy {
         Strategy::Feedforward(keys) => {
-            let command = match (&keys.model, &side.file) {
+            let command = match (&keys.model, side.file()) {
                 (ModelSource::Screw(screw), _) => screw.speed(flow)?.get(),
                 (_, Some(file)) => {
                     let model = model::parse(&file.source, &file.text)?;
@@ -74,7 +74,7 @@ fn beyond_limits_or_model(
     command: f64,
 ) -> anyhow::Result<Option<String>> {
     let (flow, unit) = (part.demand.nominal().get(), part.extruder.drive.unit_word());
-    let source = side.file.as_ref().map_or("[extruder]", |file| file.source.as_str());
+    let source = side.file().map_or("[extruder]", |file| file.source.as_str());
     let (min, max) = part.extruder.limits.range();
     if !(min..=max).contains(&command) {
         return Ok(Some(format!(
@@ -82,7 +82,7 @@ fn beyond_limits_or_model(
              {max} {unit}; the bead will not have its flow"
         )));
     }
-    let Some(file) = &side.file else { return Ok(None) };
+    let Some(file) = side.file() else { return Ok(None) };
     let (low, high) = model::parse(&file.source, &file.text)?.input_range;
     Ok((!(low..=high).contains(&command)).then(|| {
         format!(
@@ -112,7 +112,7 @@ fn too_fast(part: &ExtruderPart, side: &ExtruderSide, played: &Played) -> Option
         }
     }
     let (from_s, by, takes_s, has_s) = first?;
-    let (unit, source) = (part.extruder.drive.unit_word(), side.file.as_ref()?.source.as_str());
+    let (unit, source) = (part.extruder.drive.unit_word(), side.file()?.source.as_str());
     Some(format!(
         "{source}: {missed} of its changes are not made to their end: that of {by:.4} {unit} at \
          {from_s:.2} s takes {takes_s:.3} s at max_{unit}_per_s = {rate}, and there are {has_s:.3} s \

@@ -15,6 +15,8 @@ pub struct Robot {
     pub start_speed: MmPerS,
     /// Path length at the start speed before control begins.
     pub start_length: Mm,
+    /// Length of every bead, if the file says so.
+    pub bead_length: Option<Mm>,
     /// How long a setpoint holds on the robot \[ms\].
     pub valid_ms: u32,
 }
@@ -25,6 +27,7 @@ pub(super) fn read_robot(table: &Table<'_>, limits: Option<Limits>) -> Option<Ro
     let rate_hz = table.number("rate_hz", 0.5..=1000.0);
     let start_speed = table.number("start_speed_mm_per_s", 0.0..=10_000.0);
     let start_length = table.number("start_length_mm", 0.0..=1e6);
+    let bead_length = table.optional_number("bead_length_mm", 1e-3..=1e9);
     let valid_ms = table.integer_or("valid_ms", 100..=1000, 600);
     if address.is_some_and(|address| !address.contains(':')) {
         table.report("address", format!("\"{}\"", address.unwrap_or_default()), "host:port");
@@ -49,6 +52,7 @@ pub(super) fn read_robot(table: &Table<'_>, limits: Option<Limits>) -> Option<Ro
         rate_hz: rate_hz?,
         start_speed: MmPerS::new(start_speed?).ok()?,
         start_length: Mm::new(start_length?).ok()?,
+        bead_length: bead_length.and_then(|length| Mm::new(length).ok()),
         valid_ms: u32::try_from(valid_ms?).ok()?,
     })
 }

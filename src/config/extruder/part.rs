@@ -77,6 +77,7 @@ fn compare(extruder: &Extruder, table: &Table<'_>, kind: &PlantKind, plant_table
         PlantKind::Linear(plant) => plant.screw_lag_s.map(|_| Drive::Rpm),
         PlantKind::Pressure(_) => Some(Drive::Rpm),
         PlantKind::Screw(_) => Some(Drive::Filling),
+        PlantKind::Melt(_) => None,
     };
     if let Some(taken) = taken.filter(|taken| *taken != extruder.drive) {
         let found = format!("a plant that is told \"{}\"", taken.word());

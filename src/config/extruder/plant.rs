@@ -38,6 +38,8 @@ pub enum PlantKind {
     Pressure(PressurePlant),
     /// A screw that is filled through its feed.
     Screw(ScrewPlant),
+    /// Melt before a nozzle, from which it recedes while the pump stands.
+    Melt(MeltPlant),
 }
 
 impl PlantKind {
@@ -51,6 +53,7 @@ impl PlantKind {
             },
             Self::Pressure(_) => matches!(reading, Need::Pressure | Need::Screw),
             Self::Screw(_) => matches!(reading, Need::Filled),
+            Self::Melt(_) => false,
         }
     }
 }
@@ -70,6 +73,25 @@ pub struct PressurePlant {
     pub gain_wave: (f64, f64),
     /// A load at the input of the process \[rpm\], and when it comes \[s\].
     pub load: (f64, f64),
+}
+
+/// Melt that recedes in pauses and drools after stops, in a simulated cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeltPlant {
+    /// Flow for each unit of the command \[mm³/s\].
+    pub gain_mm3_per_s: f64,
+    /// From a command until the drive acts \[s\].
+    pub dead_time_s: f64,
+    /// Time constant of the screw \[s\].
+    pub screw_s: f64,
+    /// Melt that is stored under pressure at the usual flow, over that flow \[s\].
+    pub stored_s: f64,
+    /// What is empty before the nozzle after a long pause \[mm³\].
+    pub void_mm3: f64,
+    /// Standard deviation of that from pause to pause, as a share.
+    pub void_scatter: f64,
+    /// Standard deviation of the flow, as a share.
+    pub flow_scatter: f64,
 }
 
 /// A linear plant from command to flow.
@@ -114,13 +136,15 @@ enum Word {
     Linear,
     Pressure,
     Screw,
+    Melt,
 }
 
-const WORDS: [(&str, Word); 4] = [
+const WORDS: [(&str, Word); 5] = [
     ("direct", Word::Direct),
     ("linear", Word::Linear),
     ("pressure", Word::Pressure),
     ("screw", Word::Screw),
+    ("melt", Word::Melt),
 ];
 
 impl ExtruderPlant {
@@ -139,6 +163,7 @@ impl ExtruderPlant {
             }
             Word::Pressure => read_pressure_plant(table).map(PlantKind::Pressure),
             Word::Screw => read_screw_plant(table).map(PlantKind::Screw),
+            Word::Melt => read_melt(table).map(PlantKind::Melt),
         });
         if kind.is_none() {
             table.pass_over();
@@ -199,6 +224,25 @@ fn read_linear(table: &Table<'_>, transfer: TransferFunction) -> Option<LinearPl
         flow_noise_lag_s: lag?,
         sensor_noise: sensor,
         screw_lag_s: screw,
+    })
+}
+
+fn read_melt(table: &Table<'_>) -> Option<MeltPlant> {
+    let gain = table.number("gain_mm3_per_s", 1e-9..=1e12);
+    let dead_time = table.number_or("dead_time_s", 0.0..=60.0, 0.12);
+    let screw = table.number_or("screw_s", 1e-3..=60.0, 0.07);
+    let stored = table.number_or("stored_s", 1e-3..=60.0, 0.3);
+    let void = table.number_or("void_mm3", 0.0..=1e9, 650.0);
+    let void_scatter = table.number_or("void_scatter", 0.0..=1.0, 0.03);
+    let flow_scatter = table.number_or("flow_scatter", 0.0..=1.0, 0.01);
+    Some(MeltPlant {
+        gain_mm3_per_s: gain?,
+        dead_time_s: dead_time?,
+        screw_s: screw?,
+        stored_s: stored?,
+        void_mm3: void?,
+        void_scatter: void_scatter?,
+        flow_scatter: flow_scatter?,
     })
 }
 

@@ -15,6 +15,9 @@ const LEAST_FLOW: f64 = 0.01;
 const LEAST_MM: f64 = 1e-9;
 /// Share of the time between reports below which a piece is none.
 const LEAST_SHARE: f64 = 1e-6;
+/// Time within which a flow that stays other than the start speed's becomes the usual one
+/// \[s\].
+const USUAL_S: f64 = 3.0;
 
 /// Speeds over path. Between two reports the speed is taken to have gone from
 /// one to the other at once, at the place that the way between them tells.
@@ -25,6 +28,10 @@ pub struct Trail {
     /// Speed of the newest report \[mm/s\].
     speed: f64,
     flow_share: f64,
+    /// Logarithm of the flow's share as it has been of late.
+    usual: Option<f64>,
+    /// How far the flow has been from that of late.
+    restless: f64,
 }
 
 /// The end of a piece laid at one speed, with sums from the trail's start:
@@ -37,6 +44,8 @@ struct Node {
     sum: f64,
     /// Integral of its square \[mm\].
     square: f64,
+    /// Integral of how far the flow had been changed \[mm\].
+    changed: f64,
 }
 
 /// ln(v/v₀) over a stretch.
@@ -57,6 +66,8 @@ impl Trail {
             nodes: VecDeque::with_capacity(KEPT),
             speed: 0.0,
             flow_share: 1.0,
+            usual: None,
+            restless: 0.0,
         }
     }
 
@@ -74,8 +85,8 @@ impl Trail {
     /// the flow that came meanwhile. A path that falls, or a time that does not
     /// grow, begins a new trail.
     pub fn report(&mut self, at_s: f64, path_mm: f64, speed: f64, flow_share: f64) {
-        self.flow_share = flow_share.max(LEAST_FLOW);
         let last = self.nodes.back().copied();
+        self.flow(flow_share, last.map_or(0.0, |last| at_s - last.at_s));
         let before = std::mem::replace(&mut self.speed, speed.max(SLOWEST_MM_PER_S));
         match last {
             Some(last) if path_mm >= last.path_mm && at_s > last.at_s => {
@@ -83,9 +94,24 @@ impl Trail {
             }
             _ => {
                 self.nodes.clear();
-                self.nodes.push_back(Node { path_mm, at_s, sum: 0.0, square: 0.0 });
+                self.nodes.push_back(Node { path_mm, at_s, sum: 0.0, square: 0.0, changed: 0.0 });
             }
         }
+    }
+
+    fn flow(&mut self, share: f64, passed_s: f64) {
+        self.flow_share = share.max(LEAST_FLOW);
+        let ln = libm::log(self.flow_share);
+        let usual = self.usual.unwrap_or(ln);
+        let kept = libm::exp(-passed_s.max(0.0) / USUAL_S);
+        self.restless = (self.restless * kept).max((ln - usual).abs());
+        self.usual = Some(ln + kept * (usual - ln));
+    }
+
+    /// How far the flow is from the start speed's, unless it has long been so, as a
+    /// logarithm.
+    fn changed(&self) -> f64 {
+        libm::log(self.flow_share).abs().min(self.restless)
     }
 
     /// Adds the way from the last report to this one as a piece at each speed.
@@ -116,7 +142,8 @@ impl Trail {
             self.nodes.pop_front();
         }
         let (sum, square) = (last.sum + ln * way, last.square + ln * ln * way);
-        self.nodes.push_back(Node { path_mm, at_s, sum, square });
+        let changed = last.changed + self.changed() * way;
+        self.nodes.push_back(Node { path_mm, at_s, sum, square, changed });
     }
 
     /// When the nozzle was at a place \[s\]; `None` beyond what is known.
@@ -139,7 +166,17 @@ impl Trail {
         Some(LnSpeed { mean, variance })
     }
 
-    /// The same for a stretch that is moved until it lies within what is known.
+    /// How far the flow had been changed over a stretch of path \[mm\], as a logarithm;
+    /// `None` unless all of it is known.
+    pub fn changed_over(&self, from_mm: f64, to_mm: f64) -> Option<f64> {
+        let at = |path_mm: f64| {
+            let (before, after, share) = self.around(path_mm)?;
+            Some(before.changed + (after.changed - before.changed) * share)
+        };
+        Some((at(to_mm)? - at(from_mm)?) / (to_mm - from_mm).max(LEAST_MM))
+    }
+
+    /// Speed over a stretch that is moved until it lies within what is known.
     pub fn near(&self, from_mm: f64, to_mm: f64) -> Option<LnSpeed> {
         let (first, last) = (self.nodes.front()?, self.nodes.back()?);
         let shift = (first.path_mm - from_mm).max(0.0) - (to_mm - last.path_mm).max(0.0);

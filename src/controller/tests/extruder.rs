@@ -26,6 +26,8 @@ fn rig(law: Law) -> (ExtruderSetup, FlowDemand) {
         max_pressure: None,
         filters: crate::extruder::ReadingFilters::default(),
         robot_follows: RobotFollows::Nothing,
+        timing: None,
+        plan: None,
     };
     let demand = FlowDemand::new(Mm2::constant(10.0), MmPerS::constant(SPEED), Follows::Robot);
     (setup, demand)

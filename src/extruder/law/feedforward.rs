@@ -7,6 +7,9 @@ use crate::extruder::report::ExtruderReport;
 use crate::time::{Span, Stamp};
 use crate::units::{Mm3PerS, Rpm};
 
+/// How near to the flow that is wanted, as a share, the foretold one is when a plan is
+/// taken up.
+const HAS_COME: f64 = 0.03;
 /// Longest time without a tick that is made up for \[s\].
 const MOST_BEHIND_S: f64 = 2.0;
 
@@ -36,6 +39,9 @@ pub struct Foreseen {
     tracker: Tracker,
     about: OperatingPoint,
     outlook: Option<Outlook>,
+    /// The command that was planned for now.
+    planned: Option<f64>,
+    is_on_plan: bool,
     applied: f64,
     command: f64,
     /// Time that has passed and that the model has not \[s\].
@@ -56,7 +62,16 @@ impl Foreseen {
     /// Before its first bead. The tracker takes and gives differences from the
     /// operating point.
     pub const fn new(tracker: Tracker, about: OperatingPoint) -> Self {
-        Self { tracker, about, outlook: None, applied: 0.0, command: 0.0, behind_s: 0.0 }
+        Self {
+            tracker,
+            about,
+            outlook: None,
+            planned: None,
+            is_on_plan: false,
+            applied: 0.0,
+            command: 0.0,
+            behind_s: 0.0,
+        }
     }
 
     /// The same, which also says what will flow. The forecast takes the command
@@ -70,16 +85,26 @@ impl Foreseen {
     fn aim(&mut self, flow: Mm3PerS) {
         let off = flow.get() - self.about.flow_mm3_per_s;
         self.command = self.about.command + self.tracker.command(off);
+        let foretold = self.outlook.as_ref().map_or(flow, |outlook| outlook.flow);
+        self.is_on_plan |= (foretold - flow).get().abs() <= HAS_COME * flow.get();
+        if let Some(planned) = self.planned.filter(|_| self.is_on_plan) {
+            self.command = planned;
+        }
     }
 }
 
 impl Outlook {
     /// The pump stands, and nothing flows.
     fn begin(&mut self, about: &OperatingPoint) {
+        self.settle(0.0, about);
+        (self.turning, self.flow) = (None, Mm3PerS::ZERO);
+    }
+
+    /// What belongs to a command flows.
+    fn settle(&mut self, applied: f64, about: &OperatingPoint) {
         // Only a model without a steady state has none to begin from, and such a
         // one was refused.
-        let _ = self.forecast.start(-about.command);
-        (self.turning, self.flow) = (None, Mm3PerS::ZERO);
+        let _ = self.forecast.start(applied - about.command);
     }
 
     fn pass(&mut self, applied: f64, about: &OperatingPoint) {
@@ -99,7 +124,7 @@ impl Strategy for Foreseen {
     }
 
     fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> Wish {
-        (self.applied, self.behind_s) = (0.0, 0.0);
+        (self.applied, self.behind_s, self.is_on_plan) = (0.0, 0.0, false);
         self.tracker.start(-self.about.command);
         if let Some(outlook) = &mut self.outlook {
             outlook.begin(&self.about);
@@ -144,8 +169,24 @@ impl Strategy for Foreseen {
         Wish::known(self.command)
     }
 
+    fn plan(&mut self, command: Option<f64>) {
+        self.planned = command;
+    }
+
+    fn is_on_plan(&self) -> bool {
+        self.planned.is_some() && self.is_on_plan
+    }
+
     fn foretold(&self) -> Option<Mm3PerS> {
         self.outlook.as_ref().map(|outlook| outlook.flow)
+    }
+
+    fn flows(&mut self, now: Stamp, applied: f64) {
+        self.tracker.start(applied - self.about.command);
+        if let Some(outlook) = &mut self.outlook {
+            outlook.settle(applied, &self.about);
+        }
+        self.settle(now, applied);
     }
 
     // The tracker knows the way from where a command that was kept has led.

@@ -47,6 +47,8 @@ fn supervisor(drive: Drive, law: Law, limits: CommandLimits) -> Supervisor {
         max_pressure: None,
         filters: crate::extruder::ReadingFilters::default(),
         robot_follows: crate::extruder::RobotFollows::Nothing,
+        timing: None,
+        plan: None,
     })
 }
 

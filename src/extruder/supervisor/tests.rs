@@ -20,6 +20,8 @@ fn setup(law: Law) -> ExtruderSetup {
         max_pressure: Some(MPa::constant(2.0)),
         filters: ReadingFilters::default(),
         robot_follows: RobotFollows::Nothing,
+        timing: None,
+        plan: None,
     }
 }
 
@@ -338,3 +340,5 @@ fn a_valve_that_lets_pressure_out_waits_for_a_report_that_it_has_fallen() {
         assert_eq!((last.pump_on, last.valve_open), (false, open), "{mpa:?}");
     }
 }
+
+mod pause;

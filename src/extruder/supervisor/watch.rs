@@ -30,6 +30,9 @@ impl Supervisor {
             self.phase = Phase::Fault(ExtruderFault::Overpressure);
             return;
         }
+        if self.phase == Phase::Ending {
+            return;
+        }
         match report.pump {
             PumpMode::Fault => self.phase = Phase::Fault(ExtruderFault::Pump),
             PumpMode::On => self.runs(now, &seen),

@@ -26,6 +26,10 @@ pub const CALIBRATION_ATTACHMENT: &str = "calibration.toml";
 pub const MODEL_ATTACHMENT: &str = "extruder-model.toml";
 /// Attachment that holds the profile of commands that the cell names.
 pub const PROFILE_ATTACHMENT: &str = "extruder-profile.csv";
+/// Attachment that holds the starts and stops of the extruder that the cell names.
+pub const STARTS_ATTACHMENT: &str = "extruder-starts.toml";
+/// Attachment that holds the plan of the job that the cell names.
+pub const PLAN_ATTACHMENT: &str = "plan.csv";
 /// Name of a recording that is finished.
 pub const FILE_NAME: &str = "recording.mcap";
 /// Name of a recording that is being written, or was cut short.

@@ -21,7 +21,7 @@ fn config() -> RecordConfig {
         cell_name: "cells/a.toml".into(),
         cell_text: "[control]\ntarget_width_mm = 42.0\n".into(),
         calibration_text: Some("version = 1\n".into()),
-        extruder_file: None,
+        extruder_files: Vec::new(),
     }
 }
 

@@ -24,7 +24,7 @@ fn record(events: u64, text: usize) -> Vec<u8> {
         cell_name: "cell.toml".into(),
         cell_text: "a = 1\n".into(),
         calibration_text: Some("b = 2\n".into()),
-        extruder_file: None,
+        extruder_files: Vec::new(),
     };
     let (mut recorder, _alarms) = start(&config, folder.path()).unwrap();
     for n in 0..events {

@@ -47,7 +47,7 @@ impl ExtruderCharts {
         let severity = match side.state {
             ExtruderState::Off => 0,
             ExtruderState::Running => 1,
-            ExtruderState::Starting => 2,
+            ExtruderState::Starting | ExtruderState::Ending => 2,
             ExtruderState::Holding(_) => 3,
             ExtruderState::Fault(_) => 4,
         };

@@ -36,7 +36,9 @@ impl ProfileTally {
     /// last command is kept.
     pub fn spend(&mut self, span: Span, state: ExtruderState) {
         match state {
-            ExtruderState::Off | ExtruderState::Fault(_) => self.end_bead(),
+            ExtruderState::Off | ExtruderState::Ending | ExtruderState::Fault(_) => {
+                self.end_bead();
+            }
             ExtruderState::Starting | ExtruderState::Holding(_) => {
                 self.played.get_or_insert(Span::ZERO);
             }

@@ -103,6 +103,19 @@ impl Melt {
         }
     }
 
+    /// Having stood for so long that all has receded that can.
+    pub fn stood(machine: Machine, seed: u64) -> Self {
+        let [first, second] = machine.voids;
+        Self {
+            told: 0.0,
+            conveyed: 0.0,
+            stands_s: f64::INFINITY,
+            voids: [first.0, second.0],
+            stored_mm3: 0.0,
+            ..Self::flowing(machine, seed)
+        }
+    }
+
     /// Time since it began \[s\].
     pub const fn now_s(&self) -> f64 {
         self.now_s

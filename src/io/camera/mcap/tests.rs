@@ -95,7 +95,7 @@ fn a_recording_gives_its_frames_back_with_their_times_and_heights() {
         cell_name: "cell.toml".into(),
         cell_text: String::new(),
         calibration_text: None,
-        extruder_file: None,
+        extruder_files: Vec::new(),
     };
     let (mut recorder, _alarms) = start(&config, folder.path()).unwrap();
     let given: Vec<Frame> = (0..4).map(|seq| frame(seq, 100 + seq * 20)).collect();

@@ -1,0 +1,59 @@
+//! The plan of a job that a cell names. A plan that was made for another cell is refused
+//! before anything moves.
+
+use std::sync::Arc;
+
+use crate::cli::WrongArguments;
+use crate::config::cell::{ExtruderPart, RunPart};
+use crate::io::record::ExtruderFile;
+use crate::plan::PlannedJob;
+
+/// How far the section of a plan may lie from the cell's, as a share.
+const SAME_SECTION: f64 = 0.02;
+/// Limits may be passed by as much as a table rounds \[mm/s, or the command's unit\].
+const ROUNDED: f64 = 1e-3;
+
+/// Reads the plan and holds it against the cell.
+pub fn plan(
+    run: &RunPart,
+    part: &ExtruderPart,
+    file: &ExtruderFile,
+) -> Result<Arc<PlannedJob>, WrongArguments> {
+    let wrong = |what: String| WrongArguments::new(format!("{}: {what}", file.source));
+    let job = PlannedJob::parse(&file.text).map_err(|error| wrong(error.to_string()))?;
+    let unit = part.extruder.drive.unit();
+    if job.unit != unit {
+        return Err(wrong(format!(
+            "found commands in {}, expected {unit} as in [extruder]",
+            job.unit
+        )));
+    }
+    let limits = run.limits;
+    let (low, high) = job.speeds();
+    let (min, max) = (limits.min_speed.get(), limits.max_speed.get());
+    if low < min - ROUNDED || high > max + ROUNDED {
+        return Err(wrong(format!(
+            "found speeds from {low:.2} to {high:.2} mm/s, expected {min} to {max}, the \
+             [limits]: set those, or plan again with --apex-mm-per-s {min}"
+        )));
+    }
+    let (low, high) = job.commands();
+    let (min, max) = part.extruder.limits.range();
+    if low < min - ROUNDED || high > max + ROUNDED {
+        return Err(wrong(format!(
+            "found commands from {low:.4} to {high:.4} {unit}, expected {min} to {max}, the limits \
+             of [extruder]"
+        )));
+    }
+    let wanted = part.demand.nominal().get() / run.robot.start_speed.get();
+    for (number, bead) in (1_u32..).zip(job.beads()) {
+        let found = bead.section_mm2();
+        if (found / wanted - 1.0).abs() > SAME_SECTION {
+            return Err(wrong(format!(
+                "found a section of {found:.2} mm² for bead {number}, expected the cell's \
+                 {wanted:.2} mm²: plan again with this cell"
+            )));
+        }
+    }
+    Ok(Arc::new(job))
+}

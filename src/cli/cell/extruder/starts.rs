@@ -1,0 +1,49 @@
+//! How a cell times the starts and stops of its beads.
+
+use crate::cli::WrongArguments;
+use crate::config::cell::{ExtruderPart, RunPart};
+use crate::extruder::start_stop::{Laid, Timing};
+use crate::identify::start_stop::file;
+use crate::io::record::ExtruderFile;
+use crate::plan::PlannedJob;
+use crate::time::Span;
+use crate::units::Mm;
+
+/// Time that a robot's speed takes to follow, beside half the time of a setpoint.
+const ROBOT_LAG_S: f64 = 0.016;
+
+/// Reads the file of starts and stops for the bead of the cell.
+pub fn timing(run: &RunPart, part: &ExtruderPart, found: &ExtruderFile) -> anyhow::Result<Timing> {
+    let read = file::parse(&found.source, &found.text)?;
+    let speed = run.robot.start_speed;
+    let laid = Laid {
+        flow: part.demand.nominal(),
+        speed,
+        // A robot that is told to lay bead cannot be told to stand.
+        least_share: run.limits.min_speed / speed,
+        robot_lag: Span::from_secs(0.5 / run.robot.rate_hz + ROBOT_LAG_S),
+    };
+    Timing::new(read.parameters, laid)
+        .map_err(|error| WrongArguments::new(format!("{}: {error}", found.source)).into())
+}
+
+/// Refuses beads that would end before their extruder has come to flow and been stopped.
+pub fn has_room(
+    run: &RunPart,
+    plan: Option<&PlannedJob>,
+    timing: &Timing,
+    cell: &str,
+) -> Result<(), WrongArguments> {
+    let planned = plan.into_iter().flat_map(|plan| plan.beads().iter().map(|bead| bead.end()));
+    let Some(shortest) = planned.chain(run.robot.bead_length).reduce(Mm::min) else {
+        return Ok(());
+    };
+    let way = timing.stop().way();
+    if shortest <= way {
+        return Err(WrongArguments::new(format!(
+            "{cell}: robot.bead_length_mm or a planned bead: found {shortest}, expected more than \
+             {way}, which is laid after the pump was told to stop: leave extruder.starts out"
+        )));
+    }
+    Ok(())
+}

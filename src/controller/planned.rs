@@ -1,0 +1,45 @@
+//! A job that robot and extruder were planned for together, bead by bead.
+
+use super::by_distance::ROBOT_LAG;
+use super::{Controller, ExtruderSide};
+use crate::plan::{Planned, PlannedCourse};
+use crate::time::Stamp;
+use crate::units::{Mm, MmPerS};
+
+impl Controller {
+    /// The plan of the bead that is being laid.
+    fn course(&self) -> Option<&PlannedCourse> {
+        let plan = self.extruder.as_ref()?.plan.as_ref()?;
+        Some(plan.bead(self.beads.saturating_sub(1)).as_ref())
+    }
+
+    /// What is planned for where the nozzle is now.
+    pub(super) fn planned(&self, now: Stamp) -> Option<Planned> {
+        Some(self.course()?.at(self.nozzle(now)?))
+    }
+
+    /// What becomes of a speed of the width controller, which is one for the start
+    /// speed's flow, where a plan, a start or a stop has the robot go slower or faster;
+    /// none where it is not known how far along its plan the robot is.
+    pub(super) fn paced(&self, now: Stamp, speed: MmPerS) -> Option<MmPerS> {
+        let share = self.extruder.as_ref().map_or(1.0, |side| side.supervisor.robot_share());
+        let Some(course) = self.course() else { return Some(speed * share) };
+        let path = self.nozzle(now)? + self.robot?.speed_mm_per_s * ROBOT_LAG;
+        let planned = course.speed(path, self.setup.setpoint_period);
+        Some(speed * (share * (planned / self.setup.start_speed)))
+    }
+
+    /// The flow at the nozzle over that of the start speed, by which the bead is wider than
+    /// the robot's speed alone tells.
+    pub(super) fn flow_share(&self, now: Stamp) -> f64 {
+        let Some(ExtruderSide { supervisor, demand, .. }) = &self.extruder else { return 1.0 };
+        let planned = self.planned(now).map_or(1.0, |planned| planned.flow / demand.nominal());
+        supervisor.flow_share() * planned
+    }
+
+    /// How much of the bead is left, where its length is known.
+    pub(super) fn left(&self, now: Stamp) -> Option<Mm> {
+        let end = self.course().map(PlannedCourse::end).or(self.setup.bead_length)?;
+        Some(end - self.nozzle(now)?)
+    }
+}

@@ -1,0 +1,120 @@
+//! Starts and stops of an extruder that is known to start and to stop late.
+
+use super::*;
+use crate::extruder::start_stop::{Laid, StartStop};
+
+const SPEED: MmPerS = MmPerS::constant(50.0);
+const MACHINE: StartStop = StartStop {
+    first_flow_s: 0.2,
+    rise_s: 0.1,
+    void_mm3: 500.0,
+    idle_time_constant_s: 20.0,
+    stop_s: 0.1,
+    fall_s: 0.2,
+    drool_s: 0.05,
+    drool_time_constant_s: 0.8,
+};
+const LEAST_SHARE: f64 = 0.1;
+
+fn bench() -> Bench {
+    let laid = Laid { flow: FLOW, speed: SPEED, least_share: LEAST_SHARE, robot_lag: Span::ZERO };
+    let timing = Some(Timing::new(MACHINE, laid).unwrap());
+    let setup = ExtruderSetup { timing, ..setup(Law::Constant(Constant(30.0))) };
+    let mut bench = Bench::new(Law::Constant(Constant(30.0)));
+    bench.side = Supervisor::new(setup);
+    bench.side.link_came_up();
+    bench
+}
+
+#[test]
+fn the_robot_waits_for_the_first_flow_and_then_follows_it() {
+    let mut bench = bench();
+    // The void of a pause that nobody knows the length of is filled in one second.
+    assert_eq!(bench.go(1.1), ExtruderState::Running);
+    assert_eq!(bench.side.robot_share(), LEAST_SHARE);
+    assert!(bench.side.flow_share() < 1e-6);
+    bench.go(0.2);
+    let share = bench.side.flow_share();
+    assert!((share - (1.0 - (-1.0_f64).exp())).abs() < 0.05, "{share}");
+    assert!((bench.side.robot_share() - share).abs() < 1e-9);
+    let foretold = bench.side.trace().foretold_mm3_per_s.unwrap();
+    assert!((foretold / FLOW - share).abs() < 1e-9);
+    bench.go(0.7);
+    assert_eq!((bench.side.robot_share(), bench.side.flow_share()), (1.0, 1.0));
+    assert!(bench.sent.iter().all(|(_, command)| command.value == 30.0 && command.pump_on));
+}
+
+#[test]
+fn a_pump_that_hardly_stood_is_waited_for_hardly_at_all() {
+    let mut bench = bench();
+    bench.go(3.0);
+    bench.laying = Laying::Idle;
+    bench.report = Some(report(PumpMode::Off, 0.0));
+    bench.go(1.0);
+    bench.laying = Laying::Bead(FLOW);
+    bench.report = Some(report(PumpMode::On, 30.0));
+    // V(1 s) = 500·(1 − e^(−1/20)) = 24 mm³, in 0.05 s, after 0.2 s.
+    bench.go(0.22);
+    assert!(bench.side.flow_share() < 0.2);
+    bench.go(0.5);
+    assert!(bench.side.flow_share() > 0.98, "{}", bench.side.flow_share());
+}
+
+#[test]
+fn the_pump_stops_before_the_bead_ends_and_the_valve_stays_open_for_what_comes() {
+    let mut bench = bench();
+    bench.go(3.0);
+    let way = bench.side.way_of_stop(SPEED).unwrap();
+    assert!((4.0..20.0).contains(&way.get()), "{way}");
+    let half = bench.side.way_of_stop(SPEED * 0.5).unwrap();
+    assert!((half.get() - 0.5 * way.get()).abs() < 1e-9);
+    bench.laying = Laying::Ending(FLOW);
+    assert_eq!(bench.go(0.005), ExtruderState::Ending);
+    assert_eq!(bench.last(), ExtruderCommand { pump_on: false, valve_open: true, value: 0.0 });
+    bench.report = Some(report(PumpMode::Off, 0.0));
+    bench.go(0.3);
+    let share = bench.side.flow_share();
+    assert!((0.2..0.6).contains(&share), "{share}");
+    assert_eq!(bench.side.robot_share(), share);
+    bench.go(5.0);
+    assert_eq!(bench.side.state(), ExtruderState::Ending);
+    assert_eq!(bench.side.robot_share(), LEAST_SHARE);
+    bench.laying = Laying::Idle;
+    assert_eq!(bench.go(0.1), ExtruderState::Off);
+    assert_eq!(bench.last(), ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 });
+}
+
+#[test]
+fn the_next_bead_begins_though_the_robot_was_not_seen_idle() {
+    let mut bench = bench();
+    bench.go(3.0);
+    bench.laying = Laying::Ending(FLOW);
+    bench.go(0.005);
+    bench.report = Some(report(PumpMode::Off, 0.0));
+    bench.go(1.0);
+    bench.laying = Laying::Bead(FLOW);
+    bench.go(0.005);
+    bench.report = Some(report(PumpMode::On, 30.0));
+    assert_eq!(bench.go(0.1), ExtruderState::Running);
+    assert!(bench.last().pump_on);
+    assert!(bench.side.flow_share() < 1.0);
+}
+
+#[test]
+fn what_is_a_fault_is_one_while_a_bead_ends() {
+    let mut bench = bench();
+    bench.go(3.0);
+    bench.laying = Laying::Ending(FLOW);
+    bench.go(1.5);
+    assert_eq!(bench.side.state(), ExtruderState::Fault(ExtruderFault::RunsOn));
+    let mut bench = self::bench();
+    bench.go(3.0);
+    bench.laying = Laying::Ending(FLOW);
+    bench.go(0.005);
+    let high = MPa::constant(2.5);
+    bench.report =
+        Some(ExtruderReport { pressure_mpa: Some(high), ..report(PumpMode::Stopping, 0.0) });
+    assert_eq!(bench.go(0.1), ExtruderState::Fault(ExtruderFault::Overpressure));
+    // A pump that faulted does not come back because the bead ends.
+    assert_eq!(bench.go(0.5), ExtruderState::Fault(ExtruderFault::Overpressure));
+}

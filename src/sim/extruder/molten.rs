@@ -1,0 +1,61 @@
+//! Melt that recedes from the nozzle in pauses and drools after stops.
+
+use super::{Plant, STEP};
+use crate::config::extruder::MeltPlant;
+use crate::extruder::ExtruderReport;
+use crate::sim::start_stop::{Machine, Melt};
+use crate::units::Mm3PerS;
+
+/// The plant with its memory.
+#[derive(Debug)]
+pub struct Molten {
+    melt: Melt,
+    gain_mm3_per_s: f64,
+    /// What it was told last \[mm³/s\].
+    told: f64,
+    now_s: f64,
+    flow: Mm3PerS,
+}
+
+impl Molten {
+    /// An extruder that has stood for long, for a bead of the usual flow.
+    pub fn new(plant: &MeltPlant, seed: u64, usual: Mm3PerS) -> Self {
+        let usual_void: f64 = Machine::USUAL.voids.iter().map(|(most, _)| most).sum();
+        let size = plant.void_mm3 / usual_void;
+        let machine = Machine {
+            dead_time_s: plant.dead_time_s,
+            screw_s: plant.screw_s,
+            stored_s: plant.stored_s,
+            flow_mm3_per_s: usual.get(),
+            voids: Machine::USUAL.voids.map(|(most, slow_s)| (most * size, slow_s)),
+            passes_mm3: Machine::USUAL.passes_mm3 * size.max(f64::MIN_POSITIVE),
+            void_scatter: plant.void_scatter,
+            wander: (plant.flow_scatter, Machine::USUAL.wander.1),
+            ..Machine::USUAL
+        };
+        let melt = Melt::stood(machine, seed);
+        let gain_mm3_per_s = plant.gain_mm3_per_s;
+        Self { melt, gain_mm3_per_s, told: 0.0, now_s: 0.0, flow: Mm3PerS::ZERO }
+    }
+}
+
+impl Plant for Molten {
+    fn advance(&mut self, command: Option<f64>) {
+        let told = self.gain_mm3_per_s * command.unwrap_or(0.0).max(0.0);
+        if (told - self.told).abs() > 0.0 {
+            self.melt.command(told);
+            self.told = told;
+        }
+        self.now_s += STEP.secs();
+        while self.melt.now_s() < self.now_s {
+            let (dt_s, laid_mm3) = self.melt.advance();
+            self.flow = Mm3PerS::new(laid_mm3 / dt_s).unwrap_or_default();
+        }
+    }
+
+    fn flow(&self) -> Mm3PerS {
+        self.flow
+    }
+
+    fn sense(&mut self, _report: &mut ExtruderReport) {}
+}
