@@ -248,9 +248,15 @@ impl ByDistance {
         self.changes.push(pairing, ln_width, before, calm);
         self.unrest.note(pairing.laid_s, surprise, pairing.variance() / surprise.variance);
         self.trust.note(pairing, surprise, ln_wanted, drift);
+        if let Some(before) = self.changes.undone(pairing, (ln_width, surprise), drift) {
+            self.pulsation.shift(before.ln_width() - self.level.ln_width(), 0.0);
+            self.level = before;
+            return Use::Taken;
+        }
         let outlier = self.level.is_known() && surprise.is_far() && !self.unrest.is_great();
         if !outlier {
-            self.level.update(&sight, self.unrest.is_calm() && !pairing.is_doubtful());
+            let learns = self.unrest.is_calm() || self.level.hardly_knows_exponent();
+            self.level.update(&sight, learns && !pairing.is_doubtful());
         }
         let Some(found) = self.changes.find().filter(|_| before.is_known()) else {
             return if outlier { Use::Outlier } else { Use::Taken };

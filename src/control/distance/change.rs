@@ -8,7 +8,7 @@
 
 use std::collections::VecDeque;
 
-use super::level::{Level, Sight};
+use super::level::{Level, Sight, Surprise};
 use super::pairing::Pairing;
 
 /// Widths that are kept.
@@ -25,6 +25,13 @@ const LEAST_COVER: f64 = 0.15;
 const LEAST_WIDTHS: usize = 3;
 /// Squared distance from the median, in variances, within which widths agree.
 const AGREE: f64 = 9.0;
+/// Gauges of bead that make a change where widths scatter more than foretold.
+const LONG: f64 = 3.0;
+/// Logarithm of odds from which a change is undone, or was one; most of a squared surprise
+/// that counts for them, and widths after which it stays.
+const UNDONE: f64 = 6.0;
+const SAYS: f64 = 9.0;
+const ON_TRIAL: usize = 30;
 /// Share of its size by which a change is only known: its place is not.
 const ROUGH: f64 = 0.1;
 
@@ -48,6 +55,17 @@ pub struct Changes {
     looks: VecDeque<Look>,
     /// Where the flow changed \[mm\], and ln A before.
     last: Option<(f64, f64)>,
+    trial: Option<Trial>,
+}
+
+/// A change that may have been none: what was believed before it, held against the widths
+/// that have come since.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Trial {
+    before: Level,
+    /// Logarithm of odds for what was believed before.
+    evidence: f64,
+    widths: usize,
 }
 
 /// A change of the flow.
@@ -77,13 +95,47 @@ impl Found {
 impl Changes {
     /// None yet, for a gauge \[mm\].
     pub fn new(gauge_mm: f64) -> Self {
-        Self { gauge_mm, looks: VecDeque::with_capacity(KEPT), last: None }
+        Self { gauge_mm, looks: VecDeque::with_capacity(KEPT), last: None, trial: None }
     }
 
     /// Forgets all.
     pub fn clear(&mut self) {
         self.looks.clear();
+        (self.last, self.trial) = (None, None);
+    }
+
+    /// Holds a width against what was believed before the last change. Gives that back
+    /// where it foretells the widths since then clearly better: they were outliers that
+    /// made the change.
+    pub fn undone(
+        &mut self,
+        pairing: &Pairing,
+        (ln_width, now): (f64, Surprise),
+        drift: f64,
+    ) -> Option<Level> {
+        let trial = self.trial.as_mut()?;
+        trial.before.move_to(pairing.place_mm, drift);
+        let plain = Sight {
+            ln_width,
+            ln_speed: pairing.ln_speed,
+            cover: 1.0,
+            old_ln_width: 0.0,
+            variance: pairing.variance(),
+        };
+        let before = trial.before.surprise(&plain);
+        trial.evidence += 0.5 * (now.squared().min(SAYS) - before.squared().min(SAYS));
+        trial.widths += 1;
+        let (evidence, widths) = (trial.evidence, trial.widths);
+        if evidence < -UNDONE || widths > ON_TRIAL {
+            self.trial = None;
+        }
+        if evidence < UNDONE {
+            return None;
+        }
+        let before = self.trial.take()?.before;
         self.last = None;
+        self.looks.clear();
+        Some(before)
     }
 
     /// A width as the level is to see it: with the share of the gauge that lies
@@ -123,6 +175,7 @@ impl Changes {
             return None;
         }
         self.last = Some((best.onset_mm, best.before.ln_width()));
+        self.trial = Some(Trial { before: best.before, evidence: 0.0, widths: 0 });
         self.looks.clear();
         Some(best)
     }
@@ -135,9 +188,17 @@ impl Changes {
             .into_iter()
             .take_while(move |count| *count <= seeing)
             .map(move |count| len - count)
-            .filter(|first| self.looks.get(*first).is_some_and(|look| look.calm))
+            .filter(|first| self.may_begin_with(*first))
             .flat_map(|first| self.onsets(first).map(move |onset| (first, onset)))
             .filter_map(|(first, onset)| self.size(first, onset))
+    }
+
+    /// Where widths scatter more than foretold, only a longer piece of bead makes a change.
+    fn may_begin_with(&self, first: usize) -> bool {
+        let Some((look, last)) = self.looks.get(first).zip(self.looks.back()) else {
+            return false;
+        };
+        look.calm || last.place_mm - look.place_mm > LONG * self.gauge_mm
     }
 
     /// Where a change would lie that a width is the first to show: just within

@@ -7,8 +7,11 @@ use nalgebra::{Matrix2, RowVector2, Vector2};
 const EXPONENT_SIGMA: f64 = 0.4;
 /// How far b may move from what it was begun with, as factors.
 const EXPONENT_RANGE: (f64, f64) = (0.7, 2.2);
+/// Standard deviation of b above which it is hardly known, as a share of what it was begun
+/// with.
+const HARDLY: f64 = 0.1;
 /// Standard deviation that b keeps at an end of its range, as a share of it.
-const AT_END: f64 = 0.01;
+const AT_END: f64 = 0.3;
 /// Standard deviation that the first width leaves in ln A: it may be an
 /// outlier itself.
 const FIRST: f64 = 0.1;
@@ -101,6 +104,11 @@ impl Level {
     /// b.
     pub fn exponent(&self) -> f64 {
         self.exponent
+    }
+
+    /// Whether little is known yet of b but what it was begun with.
+    pub fn hardly_knows_exponent(&self) -> bool {
+        self.spread[2] > (HARDLY * self.begun_with).powi(2)
     }
 
     /// Standard deviation of ln A for the exponent that is believed.
