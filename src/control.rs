@@ -9,6 +9,7 @@ pub mod odometer;
 pub mod offset;
 pub mod pi;
 pub mod step;
+pub mod steps;
 pub mod target;
 pub mod transport;
 

@@ -4,12 +4,13 @@
 //! - idle: the robot is not printing.
 //! - priming: first stretch of a bead, at the start speed.
 //! - tracking: the width is held by distance, or by the PI law, once a width of
-//!   this bead has been seen.
+//!   this bead has been seen; or the speed goes through a course of steps.
 //! - holding: the speed stays as it is, for a reason; left when the reason
 //!   goes, and a fault when it stays too long.
 //! - fault: the robot is told to stop; left when the robot is idle again.
 
 mod by_distance;
+mod by_steps;
 mod extrude;
 mod planned;
 mod robot;
@@ -26,6 +27,7 @@ use crate::control::follow::{Follow, Verdict};
 use crate::control::limiter::Limits;
 use crate::control::odometer::Odometer;
 use crate::control::pi::{Pi, PiGains};
+use crate::control::steps::{StepSettings, Steps};
 use crate::control::transport::Transport;
 use crate::control::{
     Command, Event, Fault, Hold, Limit, RobotMode, RobotState, State, Step, Trace,
@@ -58,6 +60,8 @@ pub struct Setup {
     pub setpoint_period: Span,
     /// What the law by distance is told, where the width is held by it.
     pub distance: Option<DistanceSettings>,
+    /// The course of steps, where the cell asks for one.
+    pub steps: Option<StepSettings>,
 }
 
 impl Setup {
@@ -65,7 +69,7 @@ impl Setup {
     /// gauge is.
     pub fn of(cell: &Cell, run: &RunPart, calibration: &Calibration) -> Self {
         let distance = match run.control.law {
-            WidthLaw::Pi => None,
+            WidthLaw::Pi | WidthLaw::Steps(_) => None,
             WidthLaw::Distance(exponent) => Some(DistanceSettings {
                 offset: run.camera.offset,
                 offset_sigma: run.camera.offset_sigma,
@@ -86,6 +90,7 @@ impl Setup {
             alone_for: Span::from_millis(i64::from(run.robot.valid_ms)) + HOLD_TIME,
             setpoint_period: Span::from_secs(1.0 / run.robot.rate_hz),
             distance,
+            steps: cell.steps(run, calibration),
         }
     }
 
@@ -121,6 +126,8 @@ enum Steering {
     Pi { pi: Pi, demand: MmPerS },
     /// The law by distance.
     Distance,
+    /// The course of steps.
+    Steps,
 }
 
 /// Which part of a bead the robot is at.
@@ -151,6 +158,8 @@ pub struct Controller {
     distance: Option<Box<ByDistance>>,
     /// Why it is not followed on this bead.
     fallback: Option<Distrust>,
+    /// The course of steps, where the cell asks for one.
+    steps: Option<Steps>,
     follow: Follow,
     verdict: Verdict,
     /// Where on the path the bead began.
@@ -167,6 +176,7 @@ impl Controller {
     /// A controller that has seen nothing yet.
     pub fn new(setup: Setup) -> Self {
         let distance = setup.distance.map(|told| Box::new(ByDistance::new(told)));
+        let steps = setup.steps.map(Steps::new);
         Self {
             setup,
             extruder: None,
@@ -178,6 +188,7 @@ impl Controller {
             odometer: Odometer::default(),
             distance,
             fallback: None,
+            steps,
             follow: Follow::default(),
             verdict: Verdict::Follows,
             bead_start: Mm::ZERO,
@@ -290,6 +301,7 @@ impl Controller {
             Phase::Tracking { by: Steering::Distance, .. } => {
                 self.speed_by_distance(now).unwrap_or(kept)
             }
+            Phase::Tracking { by: Steering::Steps, .. } => self.speed_by_steps(now, trace),
             Phase::Holding { .. } => kept,
         };
         trace.demand_mm_per_s = Some(speed);

@@ -9,11 +9,12 @@ mod robot;
 
 use std::path::Path;
 
-use super::control::{self, Control};
+use super::control::{self, Control, WidthLaw};
 use super::extruder::Beside;
 use super::rendered::{self, Level, Simulation};
 use crate::calib::{Calibration, SurfaceMap};
 use crate::control::limiter::Limits;
+use crate::control::steps::StepSettings;
 use crate::control::target::Target;
 use crate::document::Problems;
 use crate::document::{Document, Table};
@@ -135,14 +136,31 @@ impl Cell {
         layers.zip(robot_z).map_or(Mm::ZERO, |(layers, z)| z - layers.first_z)
     }
 
+    /// Whether widths are simulated without pictures.
+    pub fn simulates_widths(&self) -> bool {
+        self.run.as_ref().is_some_and(|run| run.camera.source == Source::Rendered)
+            && self.simulation.level == Level::Widths
+    }
+
     /// Length of bead that one width is the mean of.
     pub fn gauge_length(&self, calibration: &Calibration) -> Mm {
-        let simulated = self.run.as_ref().is_some_and(|run| run.camera.source == Source::Rendered)
-            && self.simulation.level == Level::Widths;
-        if simulated {
+        if self.simulates_widths() {
             return self.simulation.gauge_length;
         }
         self.gauge.length_on(&self.surface(calibration, None)).unwrap_or_default()
+    }
+}
+
+impl Cell {
+    /// The course of steps that the cell asks for.
+    pub fn steps(&self, run: &RunPart, calibration: &Calibration) -> Option<StepSettings> {
+        let WidthLaw::Steps(share) = run.control.law else { return None };
+        Some(StepSettings {
+            start_speed: run.robot.start_speed,
+            share,
+            reach: run.camera.offset + self.gauge_length(calibration) * 0.5,
+            width_range: self.gauge.width_range,
+        })
     }
 }
 
@@ -170,6 +188,11 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let camera = camera_table.as_ref().and_then(|t| read_camera(t, folder, mount, frame_rate_hz));
     let limits = root.run_table("limits").as_ref().and_then(control::read_limits);
     let robot = root.run_table("robot").as_ref().and_then(|t| read_robot(t, limits));
+    if let (Some(table), Some(control), Some(limits), Some(robot)) =
+        (&control_table, &control, limits, &robot)
+    {
+        control::check_steps(table, control.law, robot.start_speed, limits);
+    }
     let simulation = rendered::read(root);
     let speed = robot.as_ref().map(|robot| robot.start_speed);
     let bead = width.zip(speed);

@@ -14,6 +14,11 @@ const ANY_SPEED: std::ops::RangeInclusive<f64> = 0.0..=10_000.0;
 /// share.
 const DRIFT_PER_ROOT_M: f64 = 0.0055;
 
+/// Change of the speed in a course of steps, as a share, and what it may be.
+const STEP_SHARE: f64 = 0.1;
+/// Shares that a step may have: less shows in no width, more is no small step.
+pub const STEP_SHARES: std::ops::RangeInclusive<f64> = 0.02..=0.3;
+
 /// Keys of the PI law's gains, and what they may be.
 const GAINS: [&str; 2] = ["kp_per_s", "ki_per_s2"];
 const ANY_GAIN: std::ops::RangeInclusive<f64> = 0.0..=1e4;
@@ -25,6 +30,9 @@ pub enum WidthLaw {
     Pi,
     /// By distance, with the PI law to fall back to.
     Distance(Exponent),
+    /// Not at all: the speed goes through a course of steps, each by this share of
+    /// the start speed.
+    Steps(f64),
 }
 
 /// What the law by distance is told of the bead.
@@ -65,16 +73,18 @@ pub fn read_target(control: &Table<'_>) -> Option<Mm> {
 enum Named {
     Pi,
     Distance,
+    Steps,
 }
 
 /// The rest of `[control]`. There are no defaults for gains, nor for the
 /// exponent.
 pub fn read_control(control: &Table<'_>, target: Option<Target>) -> Option<Control> {
-    let laws = [("pi", Named::Pi), ("distance", Named::Distance)];
+    let laws = [("pi", Named::Pi), ("distance", Named::Distance), ("steps", Named::Steps)];
     let law = control.required_choice("law", &laws);
     let gains = read_gains(control);
-    // A law that is but fallen back to may be without gains of its own.
-    let spared = matches!(law, Some(Named::Distance)) && !GAINS.iter().any(|key| control.has(key));
+    // A law that is but fallen back to, or not followed, may be without gains.
+    let spared = matches!(law, Some(Named::Distance | Named::Steps))
+        && !GAINS.iter().any(|key| control.has(key));
     if !spared {
         for key in GAINS.iter().filter(|key| !control.has(key)) {
             control.absent(key, "a number; there are no defaults for gains");
@@ -83,6 +93,9 @@ pub fn read_control(control: &Table<'_>, target: Option<Target>) -> Option<Contr
     let law = match law {
         Some(Named::Distance) => read_exponent(control).map(WidthLaw::Distance),
         Some(Named::Pi) => Some(WidthLaw::Pi),
+        Some(Named::Steps) => {
+            control.number_or("step_share", STEP_SHARES, STEP_SHARE).map(WidthLaw::Steps)
+        }
         None => {
             control.pass_over();
             None
@@ -112,6 +125,17 @@ fn read_exponent(control: &Table<'_>) -> Option<Exponent> {
     let learns = control.choice("exponent_learns", &[("yes", true), ("no", false)]);
     let drift = control.number_or("drift_per_root_m", 1e-5..=1.0, DRIFT_PER_ROOT_M);
     Some(Exponent { value: value?, learns: learns?, drift_per_root_m: drift? })
+}
+
+/// Refuses steps that leave the speeds that setpoints may have.
+pub fn check_steps(control: &Table<'_>, law: WidthLaw, start: MmPerS, limits: Limits) {
+    let WidthLaw::Steps(share) = law else { return };
+    let (slow, fast) = (start * (1.0 - share), start * (1.0 + share));
+    if slow < limits.min_speed || fast > limits.max_speed {
+        let (low, high) = (limits.min_speed, limits.max_speed);
+        let found = format!("{share}, which is {slow} to {fast}");
+        control.report("step_share", found, format!("speeds within [limits], {low} to {high}"));
+    }
 }
 
 /// The width that is asked for, with its course along the path and by layer.

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::distance::{DistanceTrace, Distrust};
+use super::steps::StepsTrace;
 use crate::extruder::{ExtruderCommand, ExtruderFault, ExtruderState, ExtruderTrace};
 use crate::time::Stamp;
 use crate::units::{Mm, MmPerS};
@@ -143,6 +144,9 @@ pub struct Trace {
     /// Why the width is held by the PI law instead of the one by distance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fallback: Option<Distrust>,
+    /// How far the course of steps is, where the cell asks for one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steps: Option<StepsTrace>,
     /// The last limit that acted.
     pub limit: Limit,
 }

@@ -59,6 +59,9 @@ impl Controller {
             if let Some(law) = &mut self.distance {
                 law.begin_bead();
             }
+            if let Some(steps) = &mut self.steps {
+                steps.begin_bead();
+            }
         }
         let share = self.flow_share(now);
         if let Some(law) = &mut self.distance {

@@ -32,6 +32,7 @@ pub fn setup() -> Setup {
         alone_for: Span::from_millis(1600),
         setpoint_period: Span::from_millis(200),
         distance: None,
+        steps: None,
     }
 }
 

@@ -26,6 +26,10 @@ impl Controller {
             .nozzle_path_mm
             .is_some_and(|path| path - self.bead_start >= self.setup.start_length);
         let own_bead = trace.bead_expected;
+        if self.steps.is_some() {
+            self.step_on(captured_at, width, primed && own_bead, trace);
+            return;
+        }
         let by_distance = self.distance.as_ref().is_some_and(|law| law.is_ready());
         let by_distance = by_distance && self.fallback.is_none();
         // A law that has yet to see its first whole gauge of bead is waited for.
