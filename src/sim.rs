@@ -45,4 +45,5 @@ pub mod tint;
 pub mod trial;
 pub mod truth;
 pub mod view;
+mod wander;
 pub mod waviness;

@@ -138,7 +138,9 @@ fn read_flow(table: &Table<'_>) -> Option<Flow> {
     let wavelength = table.number_or("flow_wavelength_mm", 1.0..=1e6, 1000.0);
     let pulse = table.number_or("flow_pulse_share", 0.0..=0.9, 0.0);
     let period = table.number_or("flow_pulse_period_s", 0.01..=1e4, 2.0);
+    let drift = table.number_or("flow_drift_per_root_m", 0.0..=1.0, 0.0);
     Some(Flow {
+        drift_per_root_m: drift?,
         step_at_mm: step_at?,
         step_ratio: step_ratio?,
         wave_share: wave?,

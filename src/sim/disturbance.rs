@@ -17,6 +17,8 @@ pub struct Flow {
     pub pulse_share: f64,
     /// Its period \[s\].
     pub pulse_period_s: f64,
+    /// How far it wanders along a metre of path, as a share (standard deviation).
+    pub drift_per_root_m: f64,
 }
 
 impl Flow {
@@ -28,6 +30,7 @@ impl Flow {
         wavelength_mm: 1000.0,
         pulse_share: 0.0,
         pulse_period_s: 1.0,
+        drift_per_root_m: 0.0,
     };
 
     /// The pulsation at a time \[s\] with a phase in periods, as a share of the
@@ -56,6 +59,7 @@ mod tests {
             wavelength_mm: 400.0,
             pulse_share: 0.2,
             pulse_period_s: 2.0,
+            ..Flow::STEADY
         };
         assert!((flow.pulse_at(0.5, 0.0) - 1.2).abs() < 1e-12);
         assert!((flow.pulse_at(0.5, 0.5) - 0.8).abs() < 1e-12);

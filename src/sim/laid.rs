@@ -2,6 +2,7 @@
 
 use super::bead::{BeadModel, Roughness};
 use super::disturbance::Flow;
+use super::wander::Wander;
 use super::waviness::Waviness;
 
 /// Coarsest grid along the path on which a bead is kept \[mm\].
@@ -21,6 +22,7 @@ pub struct LaidBead {
     model: BeadModel,
     flow: Flow,
     waviness: Waviness,
+    wander: Wander,
     /// What the pump does over time.
     pulse: f64,
     step_mm: f64,
@@ -60,7 +62,8 @@ impl LaidBead {
             COARSEST_MM
         };
         let waviness = Waviness::new(roughness, seed);
-        Self { model, flow, waviness, pulse: 1.0, step_mm, strips: Vec::new() }
+        let wander = Wander::new(flow.drift_per_root_m, seed);
+        Self { model, flow, waviness, wander, pulse: 1.0, step_mm, strips: Vec::new() }
     }
 
     /// Lays a piece at one speed. Pieces come in the order of the path: what
@@ -79,13 +82,13 @@ impl LaidBead {
         }
         let last = number((to_mm / self.step_mm).ceil());
         let width = self.model.width_at(speed_mm_per_s) * self.pulse;
-        let Self { flow, waviness, step_mm, strips, .. } = self;
+        let Self { flow, waviness, wander, step_mm, strips, .. } = self;
         let Some(strip) = strips.last_mut() else { return };
         strip.end_mm = to_mm;
         while strip.next_number() <= last {
             #[expect(clippy::cast_precision_loss, reason = "node numbers stay below 2^53")]
             let path_mm = strip.next_number() as f64 * *step_mm;
-            let half = 0.5 * width * flow.ratio_at(path_mm);
+            let half = 0.5 * width * flow.ratio_at(path_mm) * wander.at(path_mm);
             let [left, right] = waviness.at(path_mm);
             strip.push(left - half, right + half, *step_mm);
         }
