@@ -1,10 +1,10 @@
 //! What is left of the widths, over the offset: least squares for level and exponent at
 //! each.
 
-use super::EXPONENTS;
 use super::course::Course;
 use super::data::{Data, Look, float, median};
 use super::whiten::{Noise, Whitener};
+use super::{EXPONENTS, Seen};
 use crate::units::Mm;
 
 /// Steps of the offset at first, as a part of the gauge's length, and their limits
@@ -166,6 +166,62 @@ impl Profile {
             0.5 * (near + far)
         });
         0.5 * (below + above)
+    }
+
+    /// Variances of the level, as a share, and of the exponent, and their covariance:
+    /// those at a known offset, and what a standard deviation of the offset makes of
+    /// both.
+    pub fn covariance(&self, best: &Fit, offset_sigma_mm: f64) -> [f64; 3] {
+        let speeds = self.data.pooled(self.data.ln_speeds(best.offset_mm));
+        let speeds = speeds.into_iter().map(|speed| speed - best.mean_ln_speed);
+        let (mut n, mut x, mut xx) = (0.0, 0.0, 0.0);
+        for (speed, one) in self.whitener.apply(speeds).zip(&self.ones) {
+            n += one * one;
+            x += one * speed;
+            xx += speed * speed;
+        }
+        let share = self.variance(best) / (n * xx - x * x).max(f64::MIN_POSITIVE);
+        let ends =
+            [-1.0, 1.0].map(|side| self.at((best.offset_mm + side * offset_sigma_mm).max(0.0)));
+        let level_at =
+            |fit: &Fit| fit.level + fit.exponent * (fit.mean_ln_speed - best.mean_ln_speed);
+        let level = 0.5 * (level_at(&ends[1]) - level_at(&ends[0]));
+        let exponent = 0.5 * (ends[1].exponent - ends[0].exponent);
+        [share * xx + level * level, share * n + exponent * exponent, share * x + level * exponent]
+    }
+
+    /// Logarithms of the level in mm and of the mean speed at which it holds.
+    pub fn level(&self, best: &Fit) -> (f64, f64) {
+        (self.data.mean + best.level, best.mean_ln_speed)
+    }
+
+    /// The widths beside their speeds, one by one and in means over a gauge.
+    pub fn seen(&self, best: &Fit) -> (Vec<Seen>, Vec<Seen>) {
+        let looks = self.data.looks.iter().zip(self.data.ln_speeds(best.offset_mm));
+        let each: Vec<Seen> = looks
+            .map(|(look, ln_speed)| Seen {
+                bead: look.bead,
+                path_mm: look.path_mm,
+                count: 1,
+                ln_width: look.ln_width,
+                ln_speed,
+            })
+            .collect();
+        let widths = self.data.pooled(each.iter().map(|seen| seen.ln_width));
+        let speeds = self.data.pooled(each.iter().map(|seen| seen.ln_speed));
+        let begins = std::iter::once(&0).chain(&self.data.ends);
+        let counts = begins.zip(&self.data.ends).map(|(begin, end)| end - begin);
+        let places = self.data.places.iter().zip(counts);
+        let pooled = places.zip(widths.into_iter().zip(speeds));
+        let pieces = pooled.map(|((place, count), (ln_width, ln_speed))| Seen {
+            bead: place.bead,
+            path_mm: place.path_mm,
+            count,
+            ln_width,
+            ln_speed,
+        });
+        let pieces = pieces.collect();
+        (each, pieces)
     }
 
     /// Offsets at which less is left than about them, and at which the speed explains this
