@@ -48,6 +48,7 @@ pub mod reproduce;
 pub mod robot_sim;
 pub mod run;
 pub mod simulate;
+pub mod tune;
 pub mod verify;
 
 use std::io::IsTerminal;
@@ -105,6 +106,7 @@ enum Command {
     Identify(Box<identify::IdentifyArgs>),
     Models(models::ModelsArgs),
     Plan(plan::PlanArgs),
+    Tune(tune::TuneArgs),
 }
 
 /// How much a command says on standard error.
@@ -153,6 +155,7 @@ pub fn main() -> ExitCode {
         Command::Excite(args) => excite::run(args).map(|()| ExitCode::SUCCESS),
         Command::Identify(args) => identify::run(args).map(|()| ExitCode::SUCCESS),
         Command::Models(args) => models::run(args),
+        Command::Tune(args) => tune::run(args, voice),
         Command::Plan(args) => plan::run(args).map(|()| ExitCode::SUCCESS),
     };
     done.unwrap_or_else(|error| {

@@ -38,5 +38,6 @@ pub mod ports;
 pub mod runner;
 pub mod sim;
 pub mod time;
+pub mod tune;
 pub mod units;
 pub mod vision;

@@ -45,7 +45,7 @@ use crate::sim::render::{RenderError, Renderer};
 use crate::time::Span;
 
 pub use control::Ending;
-use control::{ExtruderWatch, LinkPort, Loop, Sources};
+use control::{ExtruderWatch, LinkPort, Loop, Sources, StepsWatch};
 use eye::Eye;
 use scribe::Scribe;
 
@@ -69,6 +69,8 @@ pub struct LiveRun {
     pub log: RunLog,
     /// How long to run; none is until something ends it.
     pub duration: Option<Span>,
+    /// Whether to end when a course of steps is over.
+    pub ends_with_steps: bool,
     /// Gives a message when the run is to end.
     pub stop: Receiver<()>,
     /// Is told what happens, in words for the operator.
@@ -179,6 +181,7 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         notice: live.notice,
         limits: live.run.limits,
         unfit: None,
+        steps: live.ends_with_steps.then(StepsWatch::default),
         shown: None,
         speed: None,
         setpoint: None,

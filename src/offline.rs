@@ -29,6 +29,7 @@ pub mod stats;
 pub mod summary;
 #[cfg(test)]
 mod synthetic;
+pub mod tuned;
 pub mod widths;
 
 pub use edges::EdgesWriter;

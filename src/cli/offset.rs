@@ -1,7 +1,7 @@
 //! `truebead offset`: how far behind the nozzle the camera looks.
 
 mod board;
-mod recording;
+pub mod recording;
 
 use std::fs::File;
 use std::io::Read;

@@ -107,7 +107,8 @@ pub fn figures(summary: &Summary) {
     }
 }
 
-fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
+/// The status of a run, with what is wrong about it told.
+pub fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
     let faults = report.summary.control.as_ref().map_or(0, |control| control.faults);
     match &report.ending {
         Ending::CameraLost(why) => {
@@ -133,7 +134,7 @@ fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
             );
             return ExitCode::FAILURE;
         }
-        Ending::Asked | Ending::TimeOver | Ending::LastFrame => {}
+        Ending::Asked | Ending::TimeOver | Ending::LastFrame | Ending::StepsOver => {}
     }
     let control = report.summary.control.as_ref();
     let at_work = |state: &&str| matches!(*state, "priming" | "tracking");

@@ -13,7 +13,7 @@ use crate::control::target::Target;
 use crate::io::clock::RunClock;
 use crate::io::record::{ExtruderFile, RecordConfig};
 use crate::io::stop::StopSignal;
-use crate::live::{self, LiveExtruder, LiveRun};
+use crate::live::{self, LiveExtruder, LiveReport, LiveRun};
 use crate::offline::{ControlFacts, LogOptions, RunLog};
 use crate::time::Span;
 
@@ -64,12 +64,37 @@ pub fn drive(
     clock: RunClock,
     voice: Voice,
 ) -> anyhow::Result<ExitCode> {
+    let max_rejected_share = loaded.cell.recording.max_rejected_share;
+    let until = Until { duration_s, ends_with_steps: false };
+    let report = live(loaded, (out, out), title, until, clock, voice)?;
+    Ok(outcome::tell(&report, out, max_rejected_share))
+}
+
+/// What ends a run besides the operator.
+#[derive(Debug, Clone, Copy)]
+pub struct Until {
+    /// This time \[s\].
+    pub duration_s: Option<f64>,
+    /// The end of a course of steps.
+    pub ends_with_steps: bool,
+}
+
+/// Runs a cell that has been loaded, with its recording in one folder and its log in
+/// another, or the same.
+pub fn live(
+    loaded: LoadedCell,
+    (out, log): (&Path, &Path),
+    title: String,
+    until: Until,
+    clock: RunClock,
+    voice: Voice,
+) -> anyhow::Result<LiveReport> {
     outcome::refuse_a_recording_in(out)?;
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
     let (extruder, extruder_files) = live_extruder(&loaded, &run)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
     let log = RunLog::create(LogOptions {
-        folder: out.to_owned(),
+        folder: log.to_owned(),
         title,
         about: about(&loaded, &run, extruder.as_ref()),
         gauge: loaded.cell.gauge,
@@ -86,7 +111,7 @@ pub fn drive(
         extruder_files,
     };
     let quiet = voice.quiet;
-    let report = live::run(LiveRun {
+    Ok(live::run(LiveRun {
         run,
         extruder,
         calibration: loaded.calibration,
@@ -94,7 +119,8 @@ pub fn drive(
         out: out.to_owned(),
         record,
         log,
-        duration: duration_s.map(Span::from_secs),
+        duration: until.duration_s.map(Span::from_secs),
+        ends_with_steps: until.ends_with_steps,
         stop: stop.told().clone(),
         notice: Box::new(move |line| {
             if !quiet {
@@ -102,8 +128,7 @@ pub fn drive(
             }
         }),
         cell: loaded.cell.clone(),
-    })?;
-    Ok(outcome::tell(&report, out, loaded.cell.recording.max_rejected_share))
+    })?)
 }
 
 /// What stands at the head of the report.

@@ -61,7 +61,7 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     let extruder = loaded.simulated_extruder()?;
     let law = extruder.as_ref().map(|rig| rig.setup.law.clone());
     let calibration = loaded.calibration.clone();
-    let recorder = SimRecorder::of(args, &loaded)?;
+    let recorder = SimRecorder::of(args.record.then_some(&args.out), &loaded)?;
     let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, recorder, extruder)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
     let log = RunLog::create(LogOptions {
@@ -105,13 +105,12 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
 }
 
 /// Keeps what happened, where that is asked for.
-struct SimRecorder(Option<RecorderHandle>);
+pub(super) struct SimRecorder(Option<RecorderHandle>);
 
 impl SimRecorder {
-    fn of(args: &SimulateArgs, loaded: &LoadedCell) -> anyhow::Result<Self> {
-        if !args.record {
-            return Ok(Self(None));
-        }
+    /// Into a folder, if one is given.
+    pub(super) fn of(folder: Option<&PathBuf>, loaded: &LoadedCell) -> anyhow::Result<Self> {
+        let Some(folder) = folder else { return Ok(Self(None)) };
         let config = RecordConfig {
             frames: KeepFrames::None,
             epoch_ns: 0,
@@ -120,11 +119,12 @@ impl SimRecorder {
             calibration_text: loaded.calibration_text.clone(),
             extruder_files: loaded.extruder()?.map_or_else(Vec::new, |side| side.files),
         };
-        let (recorder, _) = record::start(&config, &args.out)?;
+        let (recorder, _) = record::start(&config, folder)?;
         Ok(Self(Some(recorder.waiting())))
     }
 
-    fn finish(self) -> anyhow::Result<()> {
+    /// Gives the recording its name.
+    pub(super) fn finish(self) -> anyhow::Result<()> {
         if let Some(recorder) = self.0 {
             recorder.finish()?;
         }

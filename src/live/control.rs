@@ -4,6 +4,7 @@
 mod extruder;
 mod frames;
 mod robot;
+mod steps;
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
@@ -29,6 +30,7 @@ use crate::units::MmPerS;
 
 pub use extruder::ExtruderWatch;
 pub use robot::LinkPort;
+pub use steps::StepsWatch;
 
 /// Longest wait for the robot to say that it has stopped.
 const FAREWELL: Span = Span::from_millis(600);
@@ -42,6 +44,8 @@ pub enum Ending {
     TimeOver,
     /// The source had no more frames.
     LastFrame,
+    /// The course of steps was over, or the bead was before it.
+    StepsOver,
     /// The camera failed, and the controller has given up.
     CameraLost(String),
     /// What happened could not be recorded.
@@ -76,6 +80,7 @@ pub struct Loop<'a> {
     pub notice: Box<dyn FnMut(&str) + Send>,
     pub limits: Limits,
     pub unfit: Option<Ending>,
+    pub steps: Option<StepsWatch>,
     pub shown: Option<State>,
     pub speed: Option<MmPerS>,
     pub setpoint: Option<MmPerS>,
@@ -136,6 +141,9 @@ impl Loop<'_> {
             let now = self.clock.now();
             if over.is_some_and(|over| now >= over) {
                 return Ending::TimeOver;
+            }
+            if self.steps.is_some_and(StepsWatch::is_over) {
+                return Ending::StepsOver;
             }
             if now >= due {
                 self.tick(due);
@@ -200,6 +208,9 @@ impl Loop<'_> {
         if let (Some(_), Some(Command::Speed(speed))) = (handled.sent, handled.step.command) {
             self.setpoint = Some(speed);
             self.scribe.note(Note::SetpointSent);
+        }
+        if let Some(steps) = &mut self.steps {
+            steps.see(&handled.step);
         }
         self.show(now, &handled.step);
         self.show_extruder(now, &handled.step);

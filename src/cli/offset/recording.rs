@@ -9,9 +9,11 @@ use super::{OffsetArgs, tell};
 use crate::calib::Calibration;
 use crate::config::Cell;
 use crate::config::cell::Purpose;
+use crate::control::RobotState;
 use crate::control::offset::{EXPONENTS, Found, Search, find};
 use crate::io::recording::Recording;
 use crate::offline::offset::{Print, print};
+use crate::time::Stamp;
 use crate::units::Mm;
 use crate::vision::rank;
 
@@ -41,7 +43,7 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     if let Some(what) = recording.integrity().summary() {
         tell!("warning: {name}: {what}");
     }
-    let gauge = gauge(&cell, &calibration, &print)?;
+    let gauge = gauge(&cell, &calibration, &print.states)?;
     let found = find(&print.states, &print.widths, Search { gauge, farthest })
         .with_context(|| format!("{name} does not tell the offset"))?;
     let now = cell.run.as_ref().map(|run| run.camera.offset);
@@ -50,9 +52,13 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
 }
 
 /// Length of the gauge on the surface of then.
-fn gauge(cell: &Cell, calibration: &Calibration, print: &Print) -> anyhow::Result<Mm> {
+pub fn gauge(
+    cell: &Cell,
+    calibration: &Calibration,
+    states: &[(Stamp, RobotState)],
+) -> anyhow::Result<Mm> {
     // Afterwards the robot may lift the camera.
-    let laying = print.states.iter().filter(|(_, state)| state.mode.lays_bead());
+    let laying = states.iter().filter(|(_, state)| state.mode.lays_bead());
     let mut heights: Vec<f64> = laying.map(|(_, state)| state.z_mm.get()).collect();
     let robot_z = rank::median(&mut heights).and_then(|z| Mm::new(z).ok());
     let map = cell.surface(calibration, robot_z);

@@ -1,0 +1,58 @@
+//! From a recording to what is proposed.
+
+use std::path::Path;
+
+use anyhow::Context;
+
+use super::super::WrongArguments;
+use super::super::cell::LoadedCell;
+use super::super::offset::recording::gauge;
+use super::super::recorded::attached;
+use crate::config::cell::Purpose;
+use crate::io::recording::{Entry, Recording};
+use crate::offline::tuned::Tuned;
+use crate::tune::{Facts, Log, Plant};
+use crate::units::Mm;
+
+/// Smallest range of distances that is a range \[mm\].
+const SHORTEST_SEARCH_MM: f64 = 20.0;
+
+/// Reads a recording and looks at it with the eyes of a cell.
+pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<Tuned> {
+    if farthest.get() < SHORTEST_SEARCH_MM {
+        let what = format!("--max-mm: found {farthest}, expected {SHORTEST_SEARCH_MM} mm or more");
+        return Err(WrongArguments::new(what).into());
+    }
+    let name = path.display().to_string();
+    let mut recording = Recording::open(path).map_err(WrongArguments::new)?;
+    let log = log(&mut recording).context("the recording cannot be read on")?;
+    if let Some(what) = recording.integrity().summary() {
+        tell!("warning: {name}: {what}");
+    }
+    // The gauge is that of the run, whatever the cell has become since.
+    let (cell, calibration) = attached(&recording, Purpose::Run)
+        .unwrap_or_else(|_| (loaded.cell.clone(), loaded.calibration.clone()));
+    let gauge = if cell.simulates_widths() {
+        cell.gauge_length(&calibration)
+    } else {
+        gauge(&cell, &calibration, &log.states)?
+    };
+    let run = loaded.cell.run.as_ref().context("the cell was not read for a run")?;
+    let facts = Facts { gauge, farthest, start_speed: run.robot.start_speed };
+    let plant = Plant::of(&log, &facts)
+        .with_context(|| format!("{name} does not tell what the cell is like"))?;
+    Ok(Tuned::of(name, loaded.path.display().to_string(), log, plant, &loaded.cell, run)?)
+}
+
+fn log(recording: &mut Recording) -> anyhow::Result<Log> {
+    let mut log = Log::default();
+    for entry in recording {
+        match entry? {
+            Entry::Event { now, event, .. } => log.event(now, &event),
+            Entry::Step { now, step, .. } => log.step(now, &step),
+            Entry::Frame(_) => {}
+        }
+    }
+    log.finish();
+    Ok(log)
+}

@@ -1,0 +1,157 @@
+//! The experiment: the cell with steps in place of its law, live or simulated.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Context;
+use toml_edit::{DocumentMut, value};
+
+use super::super::cell::LoadedCell;
+use super::super::run::{self, Until};
+use super::super::simulate::SimRecorder;
+use super::super::{Voice, outcome};
+use super::TuneArgs;
+use crate::config::cell::Purpose;
+use crate::control::steps::{Progress, StepSettings};
+use crate::control::{Event, Step};
+use crate::io::clock::RunClock;
+use crate::io::stop::StopSignal;
+use crate::offline::output;
+use crate::sim::cell::{Sight, SimCell, Witness};
+use crate::time::Stamp;
+use crate::units::Mm;
+
+/// Keys of `[control]` that only other laws know.
+pub const OF_DISTANCE: [&str; 3] = ["exponent", "exponent_learns", "drift_per_root_m"];
+/// Bead beyond the camera's sight of the last piece, for the run-up and the way out
+/// \[mm\].
+const SPARE_MM: f64 = 50.0;
+
+/// Runs it into the folder, and gives the recording with the status of the run.
+pub fn run(
+    args: &TuneArgs,
+    loaded: &LoadedCell,
+    voice: Voice,
+) -> anyhow::Result<(PathBuf, ExitCode)> {
+    let loaded = derived(args, loaded)?;
+    let steps = steps(&loaded)?;
+    announce(args, &loaded, &steps, voice)?;
+    outcome::refuse_a_recording_in(&args.out)?;
+    output::make_folder(&args.out)?;
+    let recording = args.out.join("recording.mcap");
+    if args.simulated {
+        simulate(&args.out, &loaded)?;
+        return Ok((recording, ExitCode::SUCCESS));
+    }
+    let share = loaded.cell.recording.max_rejected_share;
+    let until = Until { duration_s: None, ends_with_steps: true };
+    let title = format!("Experiment on {}", args.cell.display());
+    let log = args.out.join("run");
+    let report = run::live(loaded, (&args.out, &log), title, until, RunClock::start(), voice)?;
+    let recording = report.recording.as_ref().map_or(recording, |whole| whole.path.clone());
+    Ok((recording, outcome::status(&report, share)))
+}
+
+/// The cell with steps in place of its law. Its text is what is attached to the
+/// recording, so that a replay runs what ran.
+fn derived(args: &TuneArgs, loaded: &LoadedCell) -> anyhow::Result<LoadedCell> {
+    let mut document: DocumentMut = loaded.text.parse().context("the cell file")?;
+    document["control"]["law"] = value("steps");
+    if let Some(control) = document["control"].as_table_like_mut() {
+        for key in OF_DISTANCE {
+            control.remove(key);
+        }
+    }
+    if let Some(share) = args.step_share {
+        document["control"]["step_share"] = value(share);
+    }
+    let read = |document: &DocumentMut| {
+        LoadedCell::from_text(&loaded.path, document.to_string(), Purpose::Run)
+    };
+    if !args.simulated {
+        return read(&document);
+    }
+    document["camera"]["source"] = value("rendered");
+    let simulated = read(&document)?;
+    let needed = whole_length(&simulated, &steps(&simulated)?)?;
+    if simulated.cell.simulation.path < needed {
+        let tables = document.as_table_mut();
+        tables.entry("simulation").or_insert_with(toml_edit::table);
+        document["simulation"]["path_mm"] = value(needed.get().ceil());
+    }
+    read(&document)
+}
+
+fn steps(loaded: &LoadedCell) -> anyhow::Result<StepSettings> {
+    let run = loaded.cell.run.as_ref().context("the cell was not read for a run")?;
+    loaded.cell.steps(run, &loaded.calibration).context("the cell has no course of steps")
+}
+
+/// Bead that it takes from the robot's start on.
+fn whole_length(loaded: &LoadedCell, steps: &StepSettings) -> anyhow::Result<Mm> {
+    let run = loaded.cell.run.as_ref().context("the cell was not read for a run")?;
+    let begins = run.robot.start_length.max(steps.reach * 1.5);
+    Ok(begins + steps.seen_length() + Mm::constant(SPARE_MM))
+}
+
+/// Says what is about to happen.
+fn announce(
+    args: &TuneArgs,
+    loaded: &LoadedCell,
+    steps: &StepSettings,
+    voice: Voice,
+) -> anyhow::Result<()> {
+    if voice.quiet {
+        return Ok(());
+    }
+    let (slow, fast) = steps.speeds();
+    let length = whole_length(loaded, steps)?;
+    let seconds = length.get() / steps.start_speed.get();
+    tell!(
+        "experiment: {} pieces of bead at {:.1}, {:.1} and {:.1} mm/s; {:.2} m of bead in all, some \
+         {seconds:.0} s",
+        StepSettings::count(),
+        slow.get(),
+        steps.start_speed.get(),
+        fast.get(),
+        length.get() / 1000.0
+    );
+    if !args.simulated {
+        tell!(
+            "the robot is told to stop when the camera has seen the last piece; Ctrl-C ends it \
+             before"
+        );
+    }
+    Ok(())
+}
+
+/// Lays the simulated bead until the camera has seen the last piece.
+fn simulate(out: &Path, loaded: &LoadedCell) -> anyhow::Result<()> {
+    let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
+    let extruder = loaded.simulated_extruder()?;
+    let recorder = SimRecorder::of(Some(&out.to_owned()), loaded)?;
+    let calibration = loaded.calibration.clone();
+    let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, recorder, extruder)?;
+    let stop = StopSignal::install().context("cannot wait for signals")?;
+    let mut watch = Watch { is_over: false, stop };
+    let _ = sim.layer(Mm::ZERO, &mut watch);
+    sim.into_recorder().finish()
+}
+
+/// Waits for the end of the steps.
+struct Watch {
+    is_over: bool,
+    stop: StopSignal,
+}
+
+impl Witness for Watch {
+    fn step(&mut self, _: Stamp, _: &Event, step: &Step) {
+        self.is_over |= step.trace.steps.is_some_and(|steps| steps.progress == Progress::Over);
+    }
+
+    fn look(&mut self, _: &Sight<'_>) {}
+
+    fn has_seen_enough(&self) -> bool {
+        self.is_over || self.stop.asked()
+    }
+}

@@ -1,0 +1,27 @@
+//! When a run ends that is there for a course of steps.
+
+use crate::control::steps::Progress;
+use crate::control::{State, Step};
+
+/// Watches a course of steps.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct StepsWatch {
+    has_begun: bool,
+    is_over: bool,
+}
+
+impl StepsWatch {
+    /// Looks at a step: the course is over when the camera has seen its last piece, and
+    /// when the bead ends or the controller gives up after it has begun.
+    pub fn see(&mut self, step: &Step) {
+        let progress = step.trace.steps.map(|steps| steps.progress);
+        self.has_begun |= progress.is_some();
+        let ends = matches!(step.state, State::Idle | State::Fault(_));
+        self.is_over |= progress == Some(Progress::Over) || self.has_begun && ends;
+    }
+
+    /// Whether it is over.
+    pub fn is_over(self) -> bool {
+        self.is_over
+    }
+}

@@ -1,0 +1,53 @@
+//! What is taken of a run: reports, widths, setpoints, and how far a course of steps
+//! came.
+
+use crate::control::offset::Width;
+use crate::control::steps::StepsTrace;
+use crate::control::{Command, Event, RobotState, Step};
+use crate::time::Stamp;
+use crate::units::MmPerS;
+
+/// A run as it was recorded, in order.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Log {
+    /// What the robot reported, when it arrived.
+    pub states: Vec<(Stamp, RobotState)>,
+    /// Widths that were measured, by capture.
+    pub widths: Vec<Width>,
+    /// From capture to arrival at the controller, for each of them \[s\].
+    pub latencies_s: Vec<f64>,
+    /// Speeds that were sent, and when.
+    pub setpoints: Vec<(Stamp, MmPerS)>,
+    /// Frames that gave no width.
+    pub refused: u64,
+    /// The newest that was said of a course of steps.
+    pub steps: Option<StepsTrace>,
+}
+
+impl Log {
+    /// Takes an event.
+    pub fn event(&mut self, now: Stamp, event: &Event) {
+        match event {
+            Event::Robot(state) => self.states.push((now, *state)),
+            Event::Measured { captured_at, width_mm, sigma_mm, .. } => {
+                self.latencies_s.push((now - *captured_at).secs());
+                self.widths.push(Width { at: *captured_at, width: *width_mm, sigma: *sigma_mm });
+            }
+            Event::Rejected { .. } => self.refused += 1,
+            _ => {}
+        }
+    }
+
+    /// Takes an answer.
+    pub fn step(&mut self, now: Stamp, step: &Step) {
+        if let Some(Command::Speed(speed)) = step.command {
+            self.setpoints.push((now, speed));
+        }
+        self.steps = step.trace.steps.or(self.steps);
+    }
+
+    /// Puts widths into the order of their frames, whatever came in between.
+    pub fn finish(&mut self) {
+        self.widths.sort_by_key(|width| width.at);
+    }
+}

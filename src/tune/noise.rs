@@ -1,0 +1,134 @@
+//! What the widths scatter by: independent from width to width, and what wanders along
+//! the path.
+
+use serde::Serialize;
+
+use super::Known;
+use crate::control::offset::{Seen, Study};
+use crate::vision::rank;
+
+/// Standard deviations of normal numbers in a median of absolute ones.
+const OF_MEDIAN: f64 = 1.4826;
+/// Relative standard deviation of such an estimate times the root of the count, for
+/// differences of neighbours, each of which is in two.
+const OF_COUNT: f64 = 1.5;
+/// Variances of the walk for each millimetre that are tried, over that of a piece:
+/// from the first by this factor.
+const FIRST: f64 = 1e-7;
+const FACTOR: f64 = 1.25;
+const TRIED: u32 = 100;
+/// What is nothing in such units: the course before the first width.
+const UNKNOWN: f64 = 1e9;
+/// Half the difference of logarithms of likelihood within which one and two standard
+/// deviations lie.
+const ONE_SIGMA: f64 = 0.5;
+const NINETY_FIVE: f64 = 1.92;
+
+/// How the scatter divides.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Scatter {
+    /// From width to width, as a share of the width.
+    pub each: Known,
+    /// What wanders along the path.
+    pub drift: Drift,
+}
+
+/// How far the flow wanders along a metre, as a share.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Drift {
+    /// The likeliest, and what one standard deviation to either side is.
+    Found {
+        /// The likeliest.
+        per_root_m: f64,
+        /// One standard deviation below.
+        low: f64,
+        /// One above.
+        high: f64,
+    },
+    /// None was seen; with 95 % it is no more than this.
+    AtMost(f64),
+}
+
+/// Divides what is left of the widths.
+pub fn scatter(study: &Study) -> Scatter {
+    Scatter { each: each(study), drift: drift(&study.pieces) }
+}
+
+/// From the differences of neighbours, which share what wanders.
+fn each(study: &Study) -> Known {
+    let pairs = study.seen.iter().zip(study.seen.iter().skip(1));
+    let same = pairs.filter(|(before, after)| before.bead == after.bead);
+    let mut sizes: Vec<f64> =
+        same.map(|(before, after)| (study.left(after) - study.left(before)).abs()).collect();
+    let count = number(sizes.len()).max(1.0);
+    let value = OF_MEDIAN * rank::median(&mut sizes).unwrap_or(0.0) / std::f64::consts::SQRT_2;
+    Known { value, sigma: value * OF_COUNT / count.sqrt() }
+}
+
+/// The likeliest walk beside independent noise, whatever level and exponent are
+/// (restricted likelihood, Patterson and Thompson 1971). Pieces are a gauge long, so
+/// that what is rough within a gauge counts as noise.
+fn drift(pieces: &[Seen]) -> Drift {
+    let tried = (0..TRIED).map(|k| FIRST * FACTOR.powi(i32::try_from(k).unwrap_or(0)));
+    let each: Vec<Likely> = tried.map(|ratio| Likely::of(pieces, ratio)).collect();
+    let none = Likely::of(pieces, 0.0);
+    let best = each.iter().copied().fold(none, |a, b| if b.ln > a.ln { b } else { a });
+    let within = |drop: f64| each.iter().filter(move |one| one.ln > best.ln - drop);
+    let most = |drop: f64| within(drop).map(|one| one.per_root_m).fold(0.0, f64::max);
+    if none.ln > best.ln - NINETY_FIVE {
+        return Drift::AtMost(most(NINETY_FIVE));
+    }
+    let low = within(ONE_SIGMA).map(|one| one.per_root_m).fold(f64::INFINITY, f64::min);
+    let per_root_m = best.per_root_m;
+    Drift::Found { per_root_m, low: low.min(per_root_m), high: most(ONE_SIGMA).max(per_root_m) }
+}
+
+/// A size of the walk and how likely it is.
+#[derive(Debug, Clone, Copy)]
+struct Likely {
+    per_root_m: f64,
+    ln: f64,
+}
+
+impl Likely {
+    /// With the variance of a millimetre's walk over that of a piece's noise. The
+    /// filter of Kalman (1960) gives what each piece differs from what those before it
+    /// foretell; the exponent is fitted to these.
+    fn of(pieces: &[Seen], ratio: f64) -> Self {
+        let mut before: Option<&Seen> = None;
+        let (mut variance, mut width, mut speed) = (UNKNOWN, 0.0, 0.0);
+        let (mut n, mut xx, mut xy, mut yy, mut logs) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for piece in pieces {
+            match before.filter(|before| before.bead == piece.bead) {
+                Some(before) => variance += ratio * (piece.path_mm - before.path_mm).abs(),
+                None => variance = UNKNOWN,
+            }
+            let total = variance + 1.0;
+            let (y, x) = (piece.ln_width - width, piece.ln_speed - speed);
+            // The first of a bead tells its level and nothing else.
+            if variance < UNKNOWN {
+                n += 1.0;
+                xx += x * x / total;
+                xy += x * y / total;
+                yy += y * y / total;
+                logs += total.ln();
+            }
+            let gain = variance / total;
+            width += gain * y;
+            speed += gain * x;
+            variance *= 1.0 - gain;
+            before = Some(piece);
+        }
+        let slope = if xx > 0.0 { xy / xx } else { 0.0 };
+        let free = (n - 1.0_f64).max(1.0);
+        let noise = ((yy - slope * xy) / free).max(f64::MIN_POSITIVE);
+        let ln = -0.5 * (free * noise.ln() + logs + xx.max(f64::MIN_POSITIVE).ln());
+        Self { per_root_m: (1000.0 * ratio * noise).sqrt(), ln }
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a count of widths")]
+fn number(count: usize) -> f64 {
+    count as f64
+}

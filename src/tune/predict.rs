@@ -1,0 +1,309 @@
+//! What each law would do on the cell as it was found: beads of the simulated cell.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::plant::Plant;
+use super::propose::{DistanceProposal, Proposal};
+use crate::calib::Calibration;
+use crate::config::Cell;
+use crate::config::cell::{RunPart, Source};
+use crate::config::control::{Exponent, WidthLaw};
+use crate::config::rendered::Level;
+use crate::control::pi::PiGains;
+use crate::control::target::Target;
+use crate::control::{Event, Step};
+use crate::runner::NoRecorder;
+use crate::sim::bead::{BeadModel, Roughness};
+use crate::sim::cell::{Sight, SimCell, SimError, Witness};
+use crate::sim::disturbance::Flow;
+use crate::time::{Span, Stamp};
+use crate::units::Mm;
+
+/// Step of the flow, as a share.
+pub const FLOW_STEP: f64 = 0.08;
+/// Beads that are laid with each law.
+pub const SEEDS: u64 = 24;
+/// Least band about the target within which a bead counts as settled \[mm\].
+const LEAST_BAND_MM: f64 = 0.5;
+/// Path from the first stretch to the flow's step, and from there to the end: at least
+/// this \[mm\], and so many times the camera's distance.
+const LEAST_MM: f64 = 1200.0;
+const TIMES: f64 = 15.0;
+/// Part of the way before the flow's step over which a bead counts as steady.
+const STEADY: f64 = 1.0 / 3.0;
+/// Places along the bead at which it is judged \[mm\].
+const EVERY_MM: f64 = 1.0;
+/// What is a single scale good for where widths are not rendered.
+const SCALE: Calibration = Calibration::Scale { mm_per_px: 0.1, sigma: None };
+/// Bandwidths that a simulated robot may have \[Hz\].
+const BANDWIDTHS_HZ: (f64, f64) = (0.01, 1000.0);
+
+/// A law that is tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// What it is called.
+    pub name: String,
+    /// Its law.
+    pub law: WidthLaw,
+    /// Gains of the PI law.
+    pub gains: Option<PiGains>,
+    /// The camera's distance that it is told \[mm\].
+    pub offset_mm: f64,
+    /// Its standard deviation \[mm\].
+    pub offset_sigma_mm: f64,
+}
+
+impl Candidate {
+    /// As the cell has it now; none where its law holds no width.
+    pub fn now(run: &RunPart) -> Option<Self> {
+        let name = match run.control.law {
+            WidthLaw::Pi => "as it is now (PI)",
+            WidthLaw::Distance(_) => "as it is now (by distance)",
+            WidthLaw::Steps(_) => return None,
+        };
+        Some(Self {
+            name: name.to_owned(),
+            law: run.control.law,
+            gains: run.control.gains,
+            offset_mm: run.camera.offset.get(),
+            offset_sigma_mm: run.camera.offset_sigma.get(),
+        })
+    }
+
+    /// The proposed PI law.
+    pub fn pi(proposal: &Proposal) -> Self {
+        Self {
+            name: "proposed PI".to_owned(),
+            law: WidthLaw::Pi,
+            gains: Some(proposal.pi.gains),
+            offset_mm: proposal.distance.offset_mm,
+            offset_sigma_mm: proposal.distance.offset_sigma_mm,
+        }
+    }
+
+    /// The proposed law by distance.
+    pub fn distance(proposal: &Proposal) -> Self {
+        Self::of("proposed, by distance", &proposal.distance)
+    }
+
+    fn of(name: &str, told: &DistanceProposal) -> Self {
+        Self {
+            name: name.to_owned(),
+            law: WidthLaw::Distance(Exponent {
+                value: told.exponent,
+                learns: true,
+                drift_per_root_m: told.drift_per_root_m,
+            }),
+            gains: None,
+            offset_mm: told.offset_mm,
+            offset_sigma_mm: told.offset_sigma_mm,
+        }
+    }
+
+    /// The law by distance as it is proposed, and with what it is told wrong.
+    pub fn misled(proposal: &Proposal) -> Vec<Self> {
+        let told = proposal.distance;
+        let cases: [(&str, f64, f64); 5] = [
+            ("as proposed", 1.0, 1.0),
+            ("offset_mm 20 % too small", 0.8, 1.0),
+            ("offset_mm 20 % too large", 1.2, 1.0),
+            ("exponent half as large", 1.0, 0.5),
+            ("exponent half as large again", 1.0, 1.5),
+        ];
+        let case = |(name, offset, exponent): (&str, f64, f64)| {
+            let told = DistanceProposal {
+                offset_mm: told.offset_mm * offset,
+                exponent: told.exponent * exponent,
+                ..told
+            };
+            Self::of(name, &told)
+        };
+        cases.map(case).to_vec()
+    }
+}
+
+/// What is foretold of a law.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Prediction {
+    /// The law.
+    pub name: String,
+    /// Way from the beginning of control until the bead is within the band, as the
+    /// median of all beads; none where most are not before the flow steps \[mm\].
+    pub start_settles_mm: Option<f64>,
+    /// The same from the flow's step to the end.
+    pub step_settles_mm: Option<f64>,
+    /// Root mean square error before the flow's step, once it is steady \[mm\].
+    pub steady_rms_mm: f64,
+    /// Root mean square error from the beginning of control to the end \[mm\].
+    pub whole_rms_mm: f64,
+    /// Fastest and slowest setpoint after control began \[mm/s\].
+    pub speeds_mm_per_s: (f64, f64),
+    /// Width of the first bead along the path \[mm\].
+    #[serde(skip)]
+    pub bead: Vec<(f64, f64)>,
+    /// Speed of the robot along the path of the first bead \[mm/s\].
+    #[serde(skip)]
+    pub speed: Vec<(f64, f64)>,
+}
+
+/// The cell as it was found, on which laws are tried.
+#[derive(Debug, Clone)]
+pub struct World {
+    cell: Cell,
+    run: RunPart,
+    target_mm: f64,
+    /// Band about the target within which a bead counts as settled \[mm\].
+    pub band_mm: f64,
+    /// Where the flow steps \[mm\].
+    pub step_at_mm: f64,
+    end_mm: f64,
+}
+
+impl World {
+    /// Of a cell and what was found. Its rates, limits and first stretch are the
+    /// cell's; bead, noise, wandering, delays and the robot are those found. A dead
+    /// time of the robot is added to the camera's, which is the same to a loop.
+    pub fn new(cell: &Cell, run: &RunPart, plant: &Plant) -> Self {
+        let (mut cell, mut run) = (cell.clone(), run.clone());
+        let target_mm = run.control.target.nominal().get();
+        let way_mm = (TIMES * plant.offset_mm.value).max(LEAST_MM);
+        let step_at_mm = run.robot.start_length.get() + way_mm;
+        let end_mm = step_at_mm + way_mm;
+        let answers = plant.answers();
+        let simulation = &mut cell.simulation;
+        simulation.level = Level::Widths;
+        simulation.path = mm(end_mm);
+        simulation.latency = Span::from_secs(plant.timing.latency_s + answers.dead_s);
+        simulation.report = Span::from_secs(plant.timing.report_s.clamp(0.001, 1.0));
+        simulation.step = Span::from_millis(1);
+        let bandwidth_hz = 1.0 / (std::f64::consts::TAU * answers.lag_s.max(1e-6));
+        simulation.robot_bandwidth_hz = bandwidth_hz.clamp(BANDWIDTHS_HZ.0, BANDWIDTHS_HZ.1);
+        simulation.gauge_length = mm(plant.gauge_mm);
+        simulation.width_noise = mm(plant.noise_mm());
+        simulation.outlier_share = 0.0;
+        simulation.missing_share = 0.0;
+        simulation.bead = BeadModel {
+            width_mm: plant.width_mm.value,
+            at_speed_mm_per_s: plant.at_speed_mm_per_s,
+            exponent: plant.exponent.value,
+            slow_below_mm_per_s: 0.0,
+            slow_exponent: plant.exponent.value,
+        };
+        simulation.roughness = Roughness { size_mm: 0.0, ..simulation.roughness };
+        simulation.flow = Flow {
+            step_at_mm,
+            step_ratio: 1.0 + FLOW_STEP,
+            drift_per_root_m: plant.drift_per_root_m(),
+            ..Flow::STEADY
+        };
+        run.extruder = None;
+        run.camera.source = Source::Rendered;
+        run.camera.offset = mm(plant.offset_mm.value);
+        run.control.target = Target::constant(mm(target_mm));
+        cell.target = Some(run.control.target.clone());
+        cell.run = Some(run.clone());
+        let band_mm = (2.0 * plant.noise_mm()).max(LEAST_BAND_MM);
+        Self { cell, run, target_mm, band_mm, step_at_mm, end_mm }
+    }
+
+    /// What a law would do.
+    pub fn predict(&self, who: &Candidate) -> Result<Prediction, SimError> {
+        let laid: Vec<Laid> =
+            (0..SEEDS).into_par_iter().map(|seed| self.lay(who, seed)).collect::<Result<_, _>>()?;
+        let square = |from: &dyn Fn(&Laid) -> f64, to_mm: f64| {
+            let errors = laid.iter().flat_map(|one| {
+                let from_mm = from(one);
+                one.bead.iter().filter(move |(at, _)| (from_mm..to_mm).contains(at))
+            });
+            let (sum, count) = errors.fold((0.0, 0.0), |(sum, count), (_, width)| {
+                (sum + (width - self.target_mm).powi(2), count + 1.0)
+            });
+            if count > 0.0 { f64::sqrt(sum / count) } else { f64::NAN }
+        };
+        let median = |way: &dyn Fn(&Laid) -> f64| {
+            let mut ways: Vec<f64> = laid.iter().map(way).collect();
+            crate::vision::rank::median(&mut ways).filter(|way| way.is_finite())
+        };
+        let steady = |one: &Laid| one.begun_mm + (1.0 - STEADY) * (self.step_at_mm - one.begun_mm);
+        let speeds = laid.iter().map(|one| one.setpoints);
+        let speeds = speeds.reduce(|a, b| (a.0.max(b.0), a.1.min(b.1))).unwrap_or_default();
+        Ok(Prediction {
+            name: who.name.clone(),
+            start_settles_mm: median(&|one| self.settles(one, one.begun_mm, self.step_at_mm)),
+            step_settles_mm: median(&|one| self.settles(one, self.step_at_mm, self.end_mm)),
+            steady_rms_mm: square(&steady, self.step_at_mm),
+            whole_rms_mm: square(&|one| one.begun_mm, self.end_mm),
+            speeds_mm_per_s: speeds,
+            bead: laid.first().map(|one| one.bead.clone()).unwrap_or_default(),
+            speed: laid.into_iter().next().map(|one| one.speed).unwrap_or_default(),
+        })
+    }
+
+    /// Way from a place to where the bead stays within the band; infinite if it does
+    /// not before the end.
+    fn settles(&self, one: &Laid, from_mm: f64, to_mm: f64) -> f64 {
+        let within: Vec<_> =
+            one.bead.iter().filter(|(at, _)| (from_mm..to_mm).contains(at)).collect();
+        let outside = within.iter().rposition(|(_, w)| (w - self.target_mm).abs() > self.band_mm);
+        match outside {
+            None if within.is_empty() => f64::INFINITY,
+            None => 0.0,
+            Some(last) => within.get(last + 1).map_or(f64::INFINITY, |(at, _)| at - from_mm),
+        }
+    }
+
+    fn lay(&self, who: &Candidate, seed: u64) -> Result<Laid, SimError> {
+        let (mut cell, mut run) = (self.cell.clone(), self.run.clone());
+        cell.simulation.seed = seed + 1;
+        run.control.law = who.law;
+        run.control.gains = who.gains;
+        run.camera.offset_sigma = mm(who.offset_sigma_mm);
+        let factor = who.offset_mm / self.run.camera.offset.get().max(1e-9);
+        let mut sim = SimCell::told(&cell, &run, factor, SCALE, NoRecorder)?;
+        let mut laid =
+            Laid { begun_mm: f64::INFINITY, setpoints: (0.0, f64::INFINITY), ..Laid::default() };
+        let _ = sim.layer(Mm::ZERO, &mut laid);
+        let mut at = 0.0;
+        while at < self.end_mm {
+            laid.bead.extend(sim.bead().width_at(at).map(|width| (at, width)));
+            at += EVERY_MM;
+        }
+        Ok(laid)
+    }
+}
+
+/// A bead that was laid.
+#[derive(Debug, Clone, Default)]
+struct Laid {
+    bead: Vec<(f64, f64)>,
+    speed: Vec<(f64, f64)>,
+    begun_mm: f64,
+    /// Fastest and slowest setpoint \[mm/s\].
+    setpoints: (f64, f64),
+}
+
+impl Witness for Laid {
+    fn step(&mut self, _: Stamp, event: &Event, step: &Step) {
+        if let Event::Robot(state) = event
+            && state.mode.lays_bead()
+        {
+            self.speed.push((state.path_mm.get(), state.speed_mm_per_s.get()));
+        }
+        let Some(crate::control::Command::Speed(speed)) = step.command else { return };
+        if step.state.name() != "tracking" {
+            return;
+        }
+        if self.begun_mm.is_infinite() {
+            self.begun_mm = self.speed.last().map_or(f64::INFINITY, |(path, _)| *path);
+        }
+        let (fastest, slowest) = self.setpoints;
+        self.setpoints = (fastest.max(speed.get()), slowest.min(speed.get()));
+    }
+
+    fn look(&mut self, _: &Sight<'_>) {}
+}
+
+fn mm(value: f64) -> Mm {
+    Mm::new(value).unwrap_or(Mm::ZERO)
+}

@@ -1,0 +1,159 @@
+//! Margins of the PI law around a bead that is seen late.
+//!
+//! A change of the speed by Δv changes the width by −b·w/v·Δv, seen one distance of
+//! the camera later. With the sign turned by the law, the loop is
+//!
+//! ```text
+//! L(s) = (kp + ki/s) · K · e^(−s·T) / (τ·s + 1)     K = b·w/v
+//! T = d/v + latency + robot's dead time + half a frame's and half a setpoint's period
+//! ```
+//!
+//! The halves are the mean delays of sampling and of holding. The gain of this loop
+//! falls with the frequency throughout, so that it has one crossover, and it is stable
+//! if and only if its gain is below 1 where its phase first is −180° (Nyquist 1932).
+
+use std::f64::consts::PI;
+
+use serde::Serialize;
+
+use super::plant::Plant;
+use crate::control::pi::PiGains;
+use crate::model::{TransferFunction, margins};
+
+/// Least margins that a loop is to have: a factor, and degrees (Åström and Murray 2008,
+/// section 9.3).
+pub const LEAST_GAIN: f64 = 2.0;
+/// See [`LEAST_GAIN`].
+pub const LEAST_PHASE_DEG: f64 = 45.0;
+
+/// The bead, the camera and the robot in the loop, at one speed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LoopPlant {
+    /// Speed of the robot \[mm/s\].
+    pub speed_mm_per_s: f64,
+    /// Width for speed, K \[mm/(mm/s)\].
+    pub gain_s: f64,
+    /// All dead time, T \[s\].
+    pub dead_s: f64,
+    /// The robot's lag, τ \[s\].
+    pub lag_s: f64,
+}
+
+/// How far a loop is from the edge of stability.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LoopMargins {
+    /// Whether it is stable at all.
+    pub is_stable: bool,
+    /// Factor by which the gain may grow; below 1 it is too large.
+    pub gain: f64,
+    /// Phase that may be lost \[deg\]; negative where there is too little already.
+    pub phase_deg: f64,
+    /// Dead time that may come in \[s\].
+    pub delay_s: f64,
+    /// Most by which a disturbance is enlarged, Ms; none of a loop that is not stable.
+    pub sensitivity: Option<f64>,
+}
+
+impl LoopMargins {
+    /// Whether these are the margins that a loop is to have.
+    pub fn are_enough(&self) -> bool {
+        self.is_stable && self.gain >= LEAST_GAIN && self.phase_deg >= LEAST_PHASE_DEG
+    }
+}
+
+impl LoopPlant {
+    /// At a speed at which bead of the wanted width is laid.
+    pub fn at(plant: &Plant, target_mm: f64, speed_mm_per_s: f64) -> Self {
+        let timing = &plant.timing;
+        let robot = plant.answers();
+        Self {
+            speed_mm_per_s,
+            gain_s: plant.exponent.value * target_mm / speed_mm_per_s,
+            dead_s: plant.offset_mm.value / speed_mm_per_s
+                + timing.latency_s
+                + robot.dead_s
+                + 0.5 * (timing.frame_s + timing.setpoint_s),
+            lag_s: robot.lag_s,
+        }
+    }
+
+    /// Gain of the loop at a frequency \[rad/s\].
+    fn size(&self, gains: PiGains, w: f64) -> f64 {
+        let law = gains.kp_per_s.hypot(gains.ki_per_s2 / w);
+        self.gain_s * law / (self.lag_s * w).hypot(1.0)
+    }
+
+    /// Its phase, without turns left out \[rad\].
+    fn phase(&self, gains: PiGains, w: f64) -> f64 {
+        let law = -libm::atan2(gains.ki_per_s2, gains.kp_per_s * w);
+        law - libm::atan(self.lag_s * w) - self.dead_s * w
+    }
+
+    /// Margins with gains on the error in mm; none where both are 0.
+    pub fn margins(&self, gains: PiGains) -> Option<LoopMargins> {
+        if gains.kp_per_s <= 0.0 && gains.ki_per_s2 <= 0.0 {
+            return None;
+        }
+        // Behind this the dead time alone has turned the phase by more than that.
+        let far = 2.0 * PI / self.dead_s.max(1e-6);
+        let turned = first(far, |w| self.phase(gains, w) + PI)?;
+        let gain = 1.0 / self.size(gains, turned);
+        let is_stable = gain > 1.0;
+        let crossover = falling(|w| self.size(gains, w) - 1.0);
+        let phase = crossover.map_or(f64::NEG_INFINITY, |w| PI + self.phase(gains, w));
+        let delay_s = crossover.map_or(f64::NEG_INFINITY, |w| (PI + self.phase(gains, w)) / w);
+        Some(LoopMargins {
+            is_stable,
+            gain,
+            phase_deg: phase.to_degrees(),
+            delay_s,
+            sensitivity: is_stable
+                .then(|| self.transfer(gains))
+                .flatten()
+                .map(|l| margins(&l).sensitivity),
+        })
+    }
+
+    /// The loop as a transfer function.
+    pub fn transfer(&self, gains: PiGains) -> Option<TransferFunction> {
+        let num = [gains.kp_per_s, gains.ki_per_s2].map(|gain| gain * self.gain_s);
+        TransferFunction::new(&num, &[self.lag_s, 1.0, 0.0], self.dead_s).ok()
+    }
+}
+
+/// Steps to the end within which no sign is missed.
+const STEPS: u32 = 4000;
+/// Halvings of an interval down to the last bit.
+const HALVINGS: u32 = 200;
+
+/// The first zero of a function that is positive at first.
+fn first(end: f64, of: impl Fn(f64) -> f64) -> Option<f64> {
+    let at = |k: u32| end * f64::from(k) / f64::from(STEPS);
+    let k = (1..=STEPS).find(|&k| of(at(k)) < 0.0)?;
+    Some(halved(at(k - 1), at(k), of))
+}
+
+/// The zero of a function that falls; none where it is positive throughout.
+fn falling(of: impl Fn(f64) -> f64) -> Option<f64> {
+    let (mut low, mut high) = (1e-9, 1e-9);
+    while of(high) > 0.0 {
+        low = high;
+        high *= 2.0;
+        if high > 1e9 {
+            return None;
+        }
+    }
+    Some(halved(low, high, of))
+}
+
+fn halved(mut low: f64, mut high: f64, of: impl Fn(f64) -> f64) -> f64 {
+    for _ in 0..HALVINGS {
+        let middle = f64::midpoint(low, high);
+        if of(middle) > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    f64::midpoint(low, high)
+}

@@ -1,0 +1,59 @@
+//! Rates and delays, from when things happened.
+
+use serde::Serialize;
+
+use super::Log;
+use crate::time::Stamp;
+use crate::vision::rank;
+
+/// What a cell's clocks do \[s\]. Each is a median, with the 99th percentile where a
+/// late one matters.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Timing {
+    /// From a frame's capture to its width's arrival at the controller.
+    pub latency_s: f64,
+    /// The same, which one of a hundred exceeds.
+    pub latency_p99_s: f64,
+    /// Time from frame to frame.
+    pub frame_s: f64,
+    /// Time from report to report.
+    pub report_s: f64,
+    /// The same, which one of a hundred exceeds.
+    pub report_p99_s: f64,
+    /// Time from setpoint to setpoint.
+    pub setpoint_s: f64,
+}
+
+/// Of a run; nothing where something never happened twice is 0.
+pub fn timing(log: &Log) -> Timing {
+    let frames: Vec<Stamp> = log.widths.iter().map(|width| width.at).collect();
+    let reports: Vec<Stamp> = log.states.iter().map(|(at, _)| *at).collect();
+    let setpoints: Vec<Stamp> = log.setpoints.iter().map(|(at, _)| *at).collect();
+    let mut latencies = log.latencies_s.clone();
+    let mut between = periods(&reports);
+    Timing {
+        latency_s: share(&mut latencies, 0.5),
+        latency_p99_s: share(&mut latencies, 0.99),
+        frame_s: share(&mut periods(&frames), 0.5),
+        report_s: share(&mut between, 0.5),
+        report_p99_s: share(&mut between, 0.99),
+        setpoint_s: share(&mut periods(&setpoints), 0.5),
+    }
+}
+
+fn periods(times: &[Stamp]) -> Vec<f64> {
+    let pairs = times.iter().zip(times.iter().skip(1));
+    pairs.map(|(before, after)| (*after - *before).secs()).collect()
+}
+
+/// The value that this share of all does not exceed; 0 of none.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "a share of a count"
+)]
+fn share(values: &mut [f64], part: f64) -> f64 {
+    let rank = (part * values.len().saturating_sub(1) as f64).round() as usize;
+    rank::at(values, rank).unwrap_or(0.0)
+}
