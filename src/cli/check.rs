@@ -214,8 +214,15 @@ fn about_ahead(side: &ExtruderSide) {
     }
 }
 
-/// Tells what the width is held by, where it is held by distance.
+/// Tells what the width is held by, where it is not the PI law.
 fn about_law(loaded: &LoadedCell, run: &RunPart) {
+    if let Some(steps) = loaded.cell.steps(run, &loaded.calibration) {
+        let (slow, fast) = steps.speeds();
+        say!(
+            "  law          none: steps between {slow} and {fast}, over {:.2} m",
+            steps.length().get() / 1e3
+        );
+    }
     let WidthLaw::Distance(told) = run.control.law else { return };
     let learnt = if told.learns { ", learnt as the bead is laid" } else { "" };
     say!("  law          by distance, b = {}{learnt}", told.value);

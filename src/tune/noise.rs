@@ -12,6 +12,8 @@ const OF_MEDIAN: f64 = 1.4826;
 /// Relative standard deviation of such an estimate times the root of the count, for
 /// differences of neighbours, each of which is in two.
 const OF_COUNT: f64 = 1.5;
+/// Times its noise by which a piece must differ from the next to count as rough.
+const ROUGHER: f64 = 1.3;
 /// Variances of the walk for each millimetre that are tried, over that of a piece:
 /// from the first by this factor.
 const FIRST: f64 = 1e-7;
@@ -29,6 +31,9 @@ const NINETY_FIVE: f64 = 1.92;
 pub struct Scatter {
     /// From width to width, as a share of the width.
     pub each: Known,
+    /// What means over a gauge's length scatter by beyond that, from one to the next, as
+    /// a share: the bead is rough, and widths whose gauges overlap share it.
+    pub rough: f64,
     /// What wanders along the path.
     pub drift: Drift,
 }
@@ -52,12 +57,19 @@ pub enum Drift {
 
 /// Divides what is left of the widths.
 pub fn scatter(study: &Study) -> Scatter {
-    Scatter { each: each(study), drift: drift(&study.pieces) }
+    let each = apart(study, &study.seen);
+    let pieces = apart(study, &study.pieces).value;
+    let widths: usize = study.pieces.iter().map(|piece| piece.count).sum();
+    let per_piece = number(widths) / number(study.pieces.len()).max(1.0);
+    let rough = (pieces.powi(2) - each.value.powi(2) / per_piece.max(1.0)).max(0.0).sqrt();
+    // Neighbours that share nothing of a gauge are no more apart than their noise.
+    let rough = if pieces > each.value / per_piece.max(1.0).sqrt() * ROUGHER { rough } else { 0.0 };
+    Scatter { each, rough, drift: drift(&study.pieces) }
 }
 
 /// From the differences of neighbours, which share what wanders.
-fn each(study: &Study) -> Known {
-    let pairs = study.seen.iter().zip(study.seen.iter().skip(1));
+fn apart(study: &Study, seen: &[Seen]) -> Known {
+    let pairs = seen.iter().zip(seen.iter().skip(1));
     let same = pairs.filter(|(before, after)| before.bead == after.bead);
     let mut sizes: Vec<f64> =
         same.map(|(before, after)| (study.left(after) - study.left(before)).abs()).collect();

@@ -32,6 +32,8 @@ const LEAST_MM: f64 = 1200.0;
 const TIMES: f64 = 15.0;
 /// Part of the way before the flow's step over which a bead counts as steady.
 const STEADY: f64 = 1.0 / 3.0;
+/// Length over which a rough bead is taken to be alike, as a part of the gauge.
+const ROUGH_PART: f64 = 0.1;
 /// Places along the bead at which it is judged \[mm\].
 const EVERY_MM: f64 = 1.0;
 /// What is a single scale good for where widths are not rendered.
@@ -190,7 +192,7 @@ impl World {
             slow_below_mm_per_s: 0.0,
             slow_exponent: plant.exponent.value,
         };
-        simulation.roughness = Roughness { size_mm: 0.0, ..simulation.roughness };
+        simulation.roughness = roughness(plant);
         simulation.flow = Flow {
             step_at_mm,
             step_ratio: 1.0 + FLOW_STEP,
@@ -302,6 +304,15 @@ impl Witness for Laid {
     }
 
     fn look(&mut self, _: &Sight<'_>) {}
+}
+
+/// A roughness that is found again in means over the gauge: of one that is alike as
+/// exp(−(distance/l)²), a mean over a long G keeps the share √π·l/G of the variance.
+fn roughness(plant: &Plant) -> Roughness {
+    let length_mm = (ROUGH_PART * plant.gauge_mm).max(0.1);
+    let size_mm = plant.scatter.rough * plant.width_mm.value
+        / (std::f64::consts::PI.sqrt() * ROUGH_PART).sqrt();
+    Roughness { size_mm, length_mm }
 }
 
 fn mm(value: f64) -> Mm {

@@ -36,6 +36,7 @@ impl Tuned {
                 "offset_mm": plant.offset_mm,
                 "gauge_mm": plant.gauge_mm,
                 "noise_share": plant.scatter.each,
+                "roughness_share": plant.scatter.rough,
                 "drift_per_root_m": plant.scatter.drift,
                 "robot": robot,
                 "timing": plant.timing,

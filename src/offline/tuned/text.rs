@@ -64,10 +64,18 @@ impl Tuned {
             (
                 "noise",
                 format!(
-                    "{:.3} ± {:.3} mm from width to width ({:.2} %)",
+                    "{:.3} ± {:.3} mm from width to width ({:.2} %); {}",
                     plant.noise_mm(),
                     each.sigma * width.value,
-                    100.0 * each.value
+                    100.0 * each.value,
+                    if plant.scatter.rough > 0.0 {
+                        format!(
+                            "the bead is rough by {:.3} mm in means over the gauge",
+                            plant.scatter.rough * width.value
+                        )
+                    } else {
+                        "no roughness seen beyond it".to_owned()
+                    }
                 ),
             ),
             ("drift", self.drift_words()),
