@@ -8,6 +8,7 @@
 //!                                                                └─▶ predict
 //! ```
 
+pub mod candidate;
 pub mod log;
 pub mod noise;
 pub mod plant;

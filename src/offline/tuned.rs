@@ -9,14 +9,17 @@ use crate::config::cell::RunPart;
 use crate::control::limiter::Limits;
 use crate::control::pi::PiGains;
 use crate::sim::cell::SimError;
+use crate::tune::candidate::Candidate;
 use crate::tune::noise::Drift;
-use crate::tune::predict::{Candidate, Prediction, World};
+use crate::tune::predict::{Prediction, SEEDS, World};
 use crate::tune::propose::{Proposal, propose, worst};
 use crate::tune::stability::{LoopMargins, LoopPlant};
 use crate::tune::{Log, Plant};
 
 /// Standard deviations from which a setting of the cell counts as wrong.
 const WRONG: f64 = 3.0;
+/// Part of the speeds' range that may be left of the robot's answer.
+const UNLIKE: f64 = 0.1;
 /// Part of widths that were refused from which the noise is not to be trusted.
 const MANY_REFUSED: f64 = 0.2;
 
@@ -109,6 +112,13 @@ impl Tuned {
         if let Err(error) = &self.plant.robot {
             warnings.push(format!("{error}; a robot of 10 Hz without dead time is taken instead"));
         }
+        warnings.extend(self.robot_warning());
+        for one in self.predictions.iter().filter(|one| one.stopped > 0) {
+            warnings.push(format!(
+                "{}: the controller gave up {} of {SEEDS} foretold beads",
+                one.name, one.stopped
+            ));
+        }
         let speed = self.plant.speed_for(self.target_mm);
         let (min, max) = (self.limits.min_speed.get(), self.limits.max_speed.get());
         if !(min..=max).contains(&speed) {
@@ -145,6 +155,18 @@ impl Tuned {
             )
         } else {
             format!("the cell's PI gains are unstable at {at} mm/s: the width would swing up")
+        })
+    }
+
+    fn robot_warning(&self) -> Option<String> {
+        let robot = self.plant.robot.ok()?;
+        let (from, to) = self.plant.study.found.speeds;
+        (robot.left_mm_per_s > UNLIKE * (to - from).get()).then(|| {
+            format!(
+                "the robot answers otherwise than by a dead time, a lag and a largest slope: {:.1} \
+                 mm/s RMS are left of its reported speed; what is foretold is not to be trusted",
+                robot.left_mm_per_s
+            )
         })
     }
 

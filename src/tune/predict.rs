@@ -3,14 +3,12 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::candidate::Candidate;
 use super::plant::Plant;
-use super::propose::{DistanceProposal, Proposal};
 use crate::calib::Calibration;
 use crate::config::Cell;
 use crate::config::cell::{RunPart, Source};
-use crate::config::control::{Exponent, WidthLaw};
-use crate::config::rendered::Level;
-use crate::control::pi::PiGains;
+use crate::config::rendered::{Level, Simulation};
 use crate::control::target::Target;
 use crate::control::{Event, Step};
 use crate::runner::NoRecorder;
@@ -18,7 +16,7 @@ use crate::sim::bead::{BeadModel, Roughness};
 use crate::sim::cell::{Sight, SimCell, SimError, Witness};
 use crate::sim::disturbance::Flow;
 use crate::time::{Span, Stamp};
-use crate::units::Mm;
+use crate::units::{Mm, MmPerS2};
 
 /// Step of the flow, as a share.
 pub const FLOW_STEP: f64 = 0.08;
@@ -41,90 +39,6 @@ const SCALE: Calibration = Calibration::Scale { mm_per_px: 0.1, sigma: None };
 /// Bandwidths that a simulated robot may have \[Hz\].
 const BANDWIDTHS_HZ: (f64, f64) = (0.01, 1000.0);
 
-/// A law that is tried.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
-    /// What it is called.
-    pub name: String,
-    /// Its law.
-    pub law: WidthLaw,
-    /// Gains of the PI law.
-    pub gains: Option<PiGains>,
-    /// The camera's distance that it is told \[mm\].
-    pub offset_mm: f64,
-    /// Its standard deviation \[mm\].
-    pub offset_sigma_mm: f64,
-}
-
-impl Candidate {
-    /// As the cell has it now; none where its law holds no width.
-    pub fn now(run: &RunPart) -> Option<Self> {
-        let name = match run.control.law {
-            WidthLaw::Pi => "as it is now (PI)",
-            WidthLaw::Distance(_) => "as it is now (by distance)",
-            WidthLaw::Steps(_) => return None,
-        };
-        Some(Self {
-            name: name.to_owned(),
-            law: run.control.law,
-            gains: run.control.gains,
-            offset_mm: run.camera.offset.get(),
-            offset_sigma_mm: run.camera.offset_sigma.get(),
-        })
-    }
-
-    /// The proposed PI law.
-    pub fn pi(proposal: &Proposal) -> Self {
-        Self {
-            name: "proposed PI".to_owned(),
-            law: WidthLaw::Pi,
-            gains: Some(proposal.pi.gains),
-            offset_mm: proposal.distance.offset_mm,
-            offset_sigma_mm: proposal.distance.offset_sigma_mm,
-        }
-    }
-
-    /// The proposed law by distance.
-    pub fn distance(proposal: &Proposal) -> Self {
-        Self::of("proposed, by distance", &proposal.distance)
-    }
-
-    fn of(name: &str, told: &DistanceProposal) -> Self {
-        Self {
-            name: name.to_owned(),
-            law: WidthLaw::Distance(Exponent {
-                value: told.exponent,
-                learns: true,
-                drift_per_root_m: told.drift_per_root_m,
-            }),
-            gains: None,
-            offset_mm: told.offset_mm,
-            offset_sigma_mm: told.offset_sigma_mm,
-        }
-    }
-
-    /// The law by distance as it is proposed, and with what it is told wrong.
-    pub fn misled(proposal: &Proposal) -> Vec<Self> {
-        let told = proposal.distance;
-        let cases: [(&str, f64, f64); 5] = [
-            ("as proposed", 1.0, 1.0),
-            ("offset_mm 20 % too small", 0.8, 1.0),
-            ("offset_mm 20 % too large", 1.2, 1.0),
-            ("exponent half as large", 1.0, 0.5),
-            ("exponent half as large again", 1.0, 1.5),
-        ];
-        let case = |(name, offset, exponent): (&str, f64, f64)| {
-            let told = DistanceProposal {
-                offset_mm: told.offset_mm * offset,
-                exponent: told.exponent * exponent,
-                ..told
-            };
-            Self::of(name, &told)
-        };
-        cases.map(case).to_vec()
-    }
-}
-
 /// What is foretold of a law.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Prediction {
@@ -139,6 +53,8 @@ pub struct Prediction {
     pub steady_rms_mm: f64,
     /// Root mean square error from the beginning of control to the end \[mm\].
     pub whole_rms_mm: f64,
+    /// Beads of which the controller gave up.
+    pub stopped: usize,
     /// Fastest and slowest setpoint after control began \[mm/s\].
     pub speeds_mm_per_s: (f64, f64),
     /// Width of the first bead along the path \[mm\].
@@ -165,41 +81,22 @@ pub struct World {
 impl World {
     /// Of a cell and what was found. Its rates, limits and first stretch are the
     /// cell's; bead, noise, wandering, delays and the robot are those found. A dead
-    /// time of the robot is added to the camera's, which is the same to a loop.
+    /// time of the robot is added to the camera's, which is the same to a loop; a largest
+    /// slope of its speed becomes that of the setpoints.
     pub fn new(cell: &Cell, run: &RunPart, plant: &Plant) -> Self {
         let (mut cell, mut run) = (cell.clone(), run.clone());
         let target_mm = run.control.target.nominal().get();
         let way_mm = (TIMES * plant.offset_mm.value).max(LEAST_MM);
         let step_at_mm = run.robot.start_length.get() + way_mm;
         let end_mm = step_at_mm + way_mm;
-        let answers = plant.answers();
-        let simulation = &mut cell.simulation;
-        simulation.level = Level::Widths;
-        simulation.path = mm(end_mm);
-        simulation.latency = Span::from_secs(plant.timing.latency_s + answers.dead_s);
-        simulation.report = Span::from_secs(plant.timing.report_s.clamp(0.001, 1.0));
-        simulation.step = Span::from_millis(1);
-        let bandwidth_hz = 1.0 / (std::f64::consts::TAU * answers.lag_s.max(1e-6));
-        simulation.robot_bandwidth_hz = bandwidth_hz.clamp(BANDWIDTHS_HZ.0, BANDWIDTHS_HZ.1);
-        simulation.gauge_length = mm(plant.gauge_mm);
-        simulation.width_noise = mm(plant.noise_mm());
-        simulation.outlier_share = 0.0;
-        simulation.missing_share = 0.0;
-        simulation.bead = BeadModel {
-            width_mm: plant.width_mm.value,
-            at_speed_mm_per_s: plant.at_speed_mm_per_s,
-            exponent: plant.exponent.value,
-            slow_below_mm_per_s: 0.0,
-            slow_exponent: plant.exponent.value,
-        };
-        simulation.roughness = roughness(plant);
-        simulation.flow = Flow {
-            step_at_mm,
-            step_ratio: 1.0 + FLOW_STEP,
-            drift_per_root_m: plant.drift_per_root_m(),
-            ..Flow::STEADY
-        };
+        as_found(&mut cell.simulation, plant);
+        cell.simulation.path = mm(end_mm);
+        cell.simulation.flow.step_at_mm = step_at_mm;
         run.extruder = None;
+        if let Some(slope) = plant.robot.ok().and_then(|robot| robot.slope_mm_per_s2) {
+            let slope = MmPerS2::new(slope).unwrap_or(run.limits.max_accel);
+            run.limits.max_accel = run.limits.max_accel.min(slope);
+        }
         run.camera.source = Source::Rendered;
         run.camera.offset = mm(plant.offset_mm.value);
         run.control.target = Target::constant(mm(target_mm));
@@ -236,6 +133,7 @@ impl World {
             step_settles_mm: median(&|one| self.settles(one, self.step_at_mm, self.end_mm)),
             steady_rms_mm: square(&steady, self.step_at_mm),
             whole_rms_mm: square(&|one| one.begun_mm, self.end_mm),
+            stopped: laid.iter().filter(|one| one.stopped).count(),
             speeds_mm_per_s: speeds,
             bead: laid.first().map(|one| one.bead.clone()).unwrap_or_default(),
             speed: laid.into_iter().next().map(|one| one.speed).unwrap_or_default(),
@@ -281,6 +179,7 @@ struct Laid {
     bead: Vec<(f64, f64)>,
     speed: Vec<(f64, f64)>,
     begun_mm: f64,
+    stopped: bool,
     /// Fastest and slowest setpoint \[mm/s\].
     setpoints: (f64, f64),
 }
@@ -292,6 +191,7 @@ impl Witness for Laid {
         {
             self.speed.push((state.path_mm.get(), state.speed_mm_per_s.get()));
         }
+        self.stopped |= step.state.name() == "fault";
         let Some(crate::control::Command::Speed(speed)) = step.command else { return };
         if step.state.name() != "tracking" {
             return;
@@ -304,6 +204,34 @@ impl Witness for Laid {
     }
 
     fn look(&mut self, _: &Sight<'_>) {}
+}
+
+/// Bead, noise, delays and robot as they were found.
+fn as_found(simulation: &mut Simulation, plant: &Plant) {
+    let answers = plant.answers();
+    simulation.level = Level::Widths;
+    simulation.latency = Span::from_secs(plant.timing.latency_s + answers.dead_s);
+    simulation.report = Span::from_secs(plant.timing.report_s.clamp(0.001, 1.0));
+    simulation.step = Span::from_millis(1);
+    let bandwidth_hz = 1.0 / (std::f64::consts::TAU * answers.lag_s.max(1e-6));
+    simulation.robot_bandwidth_hz = bandwidth_hz.clamp(BANDWIDTHS_HZ.0, BANDWIDTHS_HZ.1);
+    simulation.gauge_length = mm(plant.gauge_mm);
+    simulation.width_noise = mm(plant.noise_mm());
+    simulation.outlier_share = 0.0;
+    simulation.missing_share = 0.0;
+    simulation.bead = BeadModel {
+        width_mm: plant.width_mm.value,
+        at_speed_mm_per_s: plant.at_speed_mm_per_s,
+        exponent: plant.exponent.value,
+        slow_below_mm_per_s: 0.0,
+        slow_exponent: plant.exponent.value,
+    };
+    simulation.roughness = roughness(plant);
+    simulation.flow = Flow {
+        step_ratio: 1.0 + FLOW_STEP,
+        drift_per_root_m: plant.drift_per_root_m(),
+        ..Flow::STEADY
+    };
 }
 
 /// A roughness that is found again in means over the gauge: of one that is alike as

@@ -1,19 +1,28 @@
 //! How the robot answers its setpoints: a dead time and a lag, from the setpoint's
-//! sending to the report of the speed.
+//! sending to the report of the speed, and a largest slope where it has one.
 
 use serde::Serialize;
 
 use super::{Known, Log};
 use crate::control::{RobotMode, RobotState};
+use crate::link::motion::{Drive, Motion};
 use crate::time::{Span, Stamp};
 
 /// Dead times and lags that are tried \[s\].
 const MOST_DEAD_S: f64 = 0.8;
 const MOST_LAG_S: f64 = 1.0;
 /// Steps of the first look at the dead time \[s\], and the lags of it.
-const DEAD_STEP_S: f64 = 0.01;
-const LAGS_S: [f64; 14] =
-    [0.0, 0.005, 0.01, 0.016, 0.025, 0.04, 0.06, 0.09, 0.13, 0.19, 0.28, 0.4, 0.6, 0.9];
+const DEAD_STEP_S: f64 = 0.02;
+const LAGS_S: [f64; 9] = [0.0, 0.01, 0.02, 0.04, 0.08, 0.16, 0.3, 0.5, 0.9];
+/// A lag below which it is none \[s\].
+const LEAST_LAG_S: f64 = 1e-6;
+/// Slopes of the speed that are tried, and one that is no limit \[mm/s²\].
+const SLOPES: [f64; 9] = [15.0, 30.0, 60.0, 120.0, 240.0, 480.0, 960.0, 1900.0, 3800.0];
+const NO_SLOPE: f64 = 1e9;
+/// Change of a slope's logarithm for a step of the search of a second.
+const SLOPE_OF_STEP: f64 = 20.0;
+/// Part of the squares that may be left with a limit of the slope for it to count.
+const MUCH_LESS: f64 = 0.5;
 /// Smallest step of the search \[s\].
 const FINEST_S: f64 = 1e-5;
 /// Change of setpoints that counts as a step, as a share.
@@ -32,6 +41,8 @@ pub struct RobotAnswer {
     pub dead_time_s: Known,
     /// Time constant of the change \[s\].
     pub lag_s: Known,
+    /// Largest slope of the speed, where the robot's own is one \[mm/s²\].
+    pub slope_mm_per_s2: Option<f64>,
     /// What is left of the reported speeds \[mm/s\], root mean square.
     pub left_mm_per_s: f64,
     /// Steps of the setpoint that told it.
@@ -82,7 +93,7 @@ pub fn answer(log: &Log) -> Result<RobotAnswer, RobotError> {
     }
     let reports = printing(&log.states, told[0].0);
     let count = number(reports.len());
-    let squares = |at: [f64; 2]| squares(&told, &reports, at);
+    let squares = |at: Answer| squares(&told, &reports, at);
     let best = search(&squares);
     let left = squares(best) / count.max(1.0);
     let mean = reports.iter().map(|report| report.speed).sum::<f64>() / count.max(1.0);
@@ -95,6 +106,7 @@ pub fn answer(log: &Log) -> Result<RobotAnswer, RobotError> {
     Ok(RobotAnswer {
         dead_time_s: Known { value: best[0], sigma: dead },
         lag_s: Known { value: best[1], sigma: lag },
+        slope_mm_per_s2: (best[2] < NO_SLOPE.ln()).then(|| libm::exp(best[2])),
         left_mm_per_s: left.sqrt(),
         steps,
     })
@@ -128,72 +140,89 @@ fn printing(states: &[(Stamp, RobotState)], from_s: f64) -> Vec<Report> {
     reports
 }
 
+/// Dead time \[s\], lag \[s\] and logarithm of the largest slope of the speed in mm/s².
+type Answer = [f64; 3];
+
 /// What each reported speed differs from the model's.
-fn left(told: &[(f64, f64)], reports: &[Report], [dead_s, lag_s]: [f64; 2]) -> Vec<f64> {
-    let mut speed = 0.0;
+fn left(told: &[(f64, f64)], reports: &[Report], answer: Answer) -> Vec<f64> {
+    let [dead_s, lag_s, ln_slope] = answer;
+    let accel = libm::exp(ln_slope);
+    let lag_s = lag_s.max(LEAST_LAG_S);
+    let mut motion = Motion::default();
     let mut last_s = f64::NEG_INFINITY;
     let mut next = 0;
-    let mut input = told.first().map_or(0.0, |first| first.1);
+    let mut target = told.first().map_or(0.0, |first| first.1);
     let mut differences = Vec::with_capacity(reports.len());
     for report in reports {
         if report.is_first {
-            (speed, last_s) = (report.speed, report.at_s);
+            (motion.speed, last_s) = (report.speed, report.at_s);
         }
+        let mut go = |target: f64, at_s: f64| {
+            motion = motion.after(Drive { target, lag_s, accel }, (at_s - last_s).max(0.0));
+            last_s = last_s.max(at_s);
+        };
         while let Some((at_s, value)) = told.get(next).filter(|(at, _)| at + dead_s <= report.at_s)
         {
-            let at_s = at_s + dead_s;
-            speed = lagged(speed, input, at_s - last_s, lag_s);
-            last_s = last_s.max(at_s);
-            input = *value;
+            go(target, at_s + dead_s);
+            target = *value;
             next += 1;
         }
-        speed = lagged(speed, input, report.at_s - last_s, lag_s);
-        last_s = report.at_s;
-        differences.push(report.speed - speed);
+        go(target, report.at_s);
+        differences.push(report.speed - motion.speed);
     }
     differences
 }
 
-fn lagged(speed: f64, input: f64, dt_s: f64, lag_s: f64) -> f64 {
-    if dt_s <= 0.0 {
-        return speed;
-    }
-    if lag_s <= 0.0 {
-        return input;
-    }
-    input + (speed - input) * libm::exp(-dt_s / lag_s)
-}
-
-fn squares(told: &[(f64, f64)], reports: &[Report], at: [f64; 2]) -> f64 {
+fn squares(told: &[(f64, f64)], reports: &[Report], at: Answer) -> f64 {
     left(told, reports, at).iter().map(|left| left * left).sum()
 }
 
-/// On a grid, then by shorter and shorter steps in all directions.
-fn search(squares: &impl Fn([f64; 2]) -> f64) -> [f64; 2] {
-    let mut best = ([0.0, 0.0], f64::INFINITY);
+/// The best without a limit of the slope; the best with one where that leaves much less.
+fn search(squares: &impl Fn(Answer) -> f64) -> Answer {
+    let free = narrow(squares, look(squares, &[NO_SLOPE.ln()]), false);
+    let slopes: Vec<f64> = SLOPES.iter().map(|slope| slope.ln()).collect();
+    let bound = narrow(squares, look(squares, &slopes), true);
+    if squares(bound) < MUCH_LESS * squares(free) { bound } else { free }
+}
+
+/// On a grid.
+fn look(squares: &impl Fn(Answer) -> f64, ln_slopes: &[f64]) -> Answer {
+    let mut best = ([0.0; 3], f64::INFINITY);
     let mut dead_s = 0.0;
     while dead_s <= MOST_DEAD_S {
         for lag_s in LAGS_S {
-            let found = squares([dead_s, lag_s]);
-            if found < best.1 {
-                best = ([dead_s, lag_s], found);
+            for ln_slope in ln_slopes {
+                let at = [dead_s, lag_s, *ln_slope];
+                let found = squares(at);
+                if found < best.1 {
+                    best = (at, found);
+                }
             }
         }
         dead_s += DEAD_STEP_S;
     }
+    best.0
+}
+
+/// By shorter and shorter steps in all directions, and along the valleys in which one
+/// of them stands for another.
+fn narrow(squares: &impl Fn(Answer) -> f64, from: Answer, moves_slope: bool) -> Answer {
+    let ways =
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]];
+    let ways = &ways[..if moves_slope { 5 } else { 3 }];
+    let mut best = (from, squares(from));
     let mut step = DEAD_STEP_S;
-    // Along the valley of a dead time that stands for a lag as well as beside it.
-    let ways = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
     while step > FINEST_S {
-        let tried = ways.map(|[dead, lag]| {
+        let tried = ways.iter().flat_map(|way| [1.0, -1.0].map(|side| (way, side * step)));
+        let tried = tried.map(|([dead, lag, slope], by)| {
             let at = [
-                (best.0[0] + dead * step).clamp(0.0, MOST_DEAD_S),
-                (best.0[1] + lag * step).clamp(0.0, MOST_LAG_S),
+                (best.0[0] + dead * by).clamp(0.0, MOST_DEAD_S),
+                (best.0[1] + lag * by).clamp(0.0, MOST_LAG_S),
+                best.0[2] + slope * by * SLOPE_OF_STEP,
             ];
             (at, squares(at))
         });
-        let next = tried.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
-        match next.filter(|next| next.1 < best.1) {
+        match tried.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|next| next.1 < best.1) {
             Some(next) => best = next,
             None => step *= 0.5,
         }
@@ -203,7 +232,7 @@ fn search(squares: &impl Fn([f64; 2]) -> f64) -> [f64; 2] {
 
 /// Standard deviations by the slopes of the model at the best, for what is left as
 /// independent noise.
-fn sigmas(told: &[(f64, f64)], reports: &[Report], best: [f64; 2], variance: f64) -> [f64; 2] {
+fn sigmas(told: &[(f64, f64)], reports: &[Report], best: Answer, variance: f64) -> [f64; 2] {
     let slope = |which: usize| {
         let mut ends = [best, best];
         ends[0][which] = (best[which] - STEP_OF_SIGMA).max(0.0);

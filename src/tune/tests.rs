@@ -197,6 +197,11 @@ fn a_recording_that_tells_nothing_is_refused_with_what_to_do() {
 
 /// A robot with a dead time and a lag, reported every 20 ms with noise.
 fn answered(dead_s: f64, lag_s: f64, noise: f64) -> Log {
+    ramped(dead_s, lag_s, 1e9, noise)
+}
+
+/// The same with a largest slope.
+fn ramped(dead_s: f64, lag_s: f64, slope: f64, noise: f64) -> Log {
     let mut log = Log::default();
     let speeds = [100.0, 110.0, 90.0, 100.0, 90.0, 110.0, 100.0];
     for (number, speed) in speeds.into_iter().enumerate() {
@@ -211,7 +216,8 @@ fn answered(dead_s: f64, lag_s: f64, noise: f64) -> Log {
         let at = f64::from(tick) * 1e-4;
         let told = log.setpoints.iter().rev().find(|(then, _)| then.secs() + dead_s <= at);
         let told = told.map_or(100.0, |(_, told)| told.get());
-        speed += (told - speed) * -libm::expm1(-1e-4 / lag_s);
+        let change = (told - speed) * -libm::expm1(-1e-4 / lag_s);
+        speed += change.clamp(-slope * 1e-4, slope * 1e-4);
         path += speed * 1e-4;
         if tick % 200 == 0 {
             let key = crate::sim::hash::mix(&[9, u64::from(tick)]);
@@ -240,10 +246,14 @@ fn a_robot_that_answers_late_and_slowly_is_found() {
             assert!(off < 3.5 * known.sigma + 2e-4, "{known:?} for {truth}");
             assert!(known.sigma < 0.01);
         };
+        assert_eq!(found.slope_mm_per_s2, None);
         near(found.dead_time_s, dead_s);
         near(found.lag_s, lag_s);
         assert!((found.left_mm_per_s - 0.2).abs() < 0.04);
     }
+    let found = robot::answer(&ramped(0.05, 0.04, 50.0, 0.2)).unwrap();
+    assert!((found.slope_mm_per_s2.unwrap() - 50.0).abs() < 1.0, "{found:?}");
+    assert!((found.dead_time_s.value - 0.05).abs() < 0.01, "{found:?}");
     let mut steady = answered(0.0, 0.05, 0.2);
     for (_, speed) in &mut steady.setpoints {
         *speed = MmPerS::constant(100.0);

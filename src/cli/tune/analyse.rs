@@ -39,8 +39,15 @@ pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<T
     };
     let run = loaded.cell.run.as_ref().context("the cell was not read for a run")?;
     let facts = Facts { gauge, farthest, start_speed: run.robot.start_speed };
-    let plant = Plant::of(&log, &facts)
-        .with_context(|| format!("{name} does not tell what the cell is like"))?;
+    let plant = Plant::of(&log, &facts).with_context(|| {
+        let extruder = if run.extruder.is_some() {
+            " (the cell commands its extruder: where the flow follows the speed, the width does \
+             not; tune with an even flow)"
+        } else {
+            ""
+        };
+        format!("{name} does not tell what the cell is like{extruder}")
+    })?;
     Ok(Tuned::of(name, loaded.path.display().to_string(), log, plant, &loaded.cell, run)?)
 }
 

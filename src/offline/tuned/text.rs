@@ -29,18 +29,6 @@ impl Tuned {
         let plant = &self.plant;
         let (width, exponent, offset) = (plant.width_mm, plant.exponent, plant.offset_mm);
         let (from, to) = plant.study.found.speeds;
-        let each = plant.scatter.each;
-        let robot = match &plant.robot {
-            Ok(robot) => format!(
-                "answers after {:.0} ± {:.1} ms with a lag of {:.0} ± {:.1} ms; {:.2} mm/s RMS left",
-                1e3 * robot.dead_time_s.value,
-                1e3 * robot.dead_time_s.sigma,
-                1e3 * robot.lag_s.value,
-                1e3 * robot.lag_s.sigma,
-                robot.left_mm_per_s
-            ),
-            Err(error) => error.to_string(),
-        };
         vec![
             (
                 "bead",
@@ -61,25 +49,9 @@ impl Tuned {
                 ),
             ),
             ("speed", format!("{:.1} to {:.1} mm/s while it was laid", from.get(), to.get())),
-            (
-                "noise",
-                format!(
-                    "{:.3} ± {:.3} mm from width to width ({:.2} %); {}",
-                    plant.noise_mm(),
-                    each.sigma * width.value,
-                    100.0 * each.value,
-                    if plant.scatter.rough > 0.0 {
-                        format!(
-                            "the bead is rough by {:.3} mm in means over the gauge",
-                            plant.scatter.rough * width.value
-                        )
-                    } else {
-                        "no roughness seen beyond it".to_owned()
-                    }
-                ),
-            ),
+            ("noise", self.noise_words()),
             ("drift", self.drift_words()),
-            ("robot", robot),
+            ("robot", self.robot_words()),
             ("timing", self.timing_words()),
             (
                 "widths",
@@ -92,6 +64,38 @@ impl Tuned {
                 ),
             ),
         ]
+    }
+
+    fn noise_words(&self) -> String {
+        let (width, scatter) = (self.plant.width_mm.value, &self.plant.scatter);
+        let rough = if scatter.rough > 0.0 {
+            format!("the bead is rough by {:.3} mm in means over the gauge", scatter.rough * width)
+        } else {
+            "no roughness seen beyond it".to_owned()
+        };
+        format!(
+            "{:.3} ± {:.3} mm from width to width ({:.2} %); {rough}",
+            self.plant.noise_mm(),
+            scatter.each.sigma * width,
+            100.0 * scatter.each.value
+        )
+    }
+
+    fn robot_words(&self) -> String {
+        match &self.plant.robot {
+            Ok(robot) => format!(
+                "answers after {:.0} ± {:.1} ms with a lag of {:.0} ± {:.1} ms{}; {:.2} mm/s RMS left",
+                1e3 * robot.dead_time_s.value,
+                1e3 * robot.dead_time_s.sigma,
+                1e3 * robot.lag_s.value,
+                1e3 * robot.lag_s.sigma,
+                robot
+                    .slope_mm_per_s2
+                    .map_or(String::new(), |slope| { format!(", at {slope:.0} mm/s² at most") }),
+                robot.left_mm_per_s
+            ),
+            Err(error) => error.to_string(),
+        }
     }
 
     fn timing_words(&self) -> String {

@@ -1,0 +1,90 @@
+//! Laws that are tried on a cell as it was found.
+
+use super::propose::{DistanceProposal, Proposal};
+use crate::config::cell::RunPart;
+use crate::config::control::{Exponent, WidthLaw};
+use crate::control::pi::PiGains;
+
+/// A law that is tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// What it is called.
+    pub name: String,
+    /// Its law.
+    pub law: WidthLaw,
+    /// Gains of the PI law.
+    pub gains: Option<PiGains>,
+    /// The camera's distance that it is told \[mm\].
+    pub offset_mm: f64,
+    /// Its standard deviation \[mm\].
+    pub offset_sigma_mm: f64,
+}
+
+impl Candidate {
+    /// As the cell has it now; none where its law holds no width.
+    pub fn now(run: &RunPart) -> Option<Self> {
+        let name = match run.control.law {
+            WidthLaw::Pi => "as it is now (PI)",
+            WidthLaw::Distance(_) => "as it is now (by distance)",
+            WidthLaw::Steps(_) => return None,
+        };
+        Some(Self {
+            name: name.to_owned(),
+            law: run.control.law,
+            gains: run.control.gains,
+            offset_mm: run.camera.offset.get(),
+            offset_sigma_mm: run.camera.offset_sigma.get(),
+        })
+    }
+
+    /// The proposed PI law.
+    pub fn pi(proposal: &Proposal) -> Self {
+        Self {
+            name: "proposed PI".to_owned(),
+            law: WidthLaw::Pi,
+            gains: Some(proposal.pi.gains),
+            offset_mm: proposal.distance.offset_mm,
+            offset_sigma_mm: proposal.distance.offset_sigma_mm,
+        }
+    }
+
+    /// The proposed law by distance.
+    pub fn distance(proposal: &Proposal) -> Self {
+        Self::of("proposed, by distance", &proposal.distance)
+    }
+
+    fn of(name: &str, told: &DistanceProposal) -> Self {
+        Self {
+            name: name.to_owned(),
+            law: WidthLaw::Distance(Exponent {
+                value: told.exponent,
+                learns: true,
+                drift_per_root_m: told.drift_per_root_m,
+            }),
+            gains: None,
+            offset_mm: told.offset_mm,
+            offset_sigma_mm: told.offset_sigma_mm,
+        }
+    }
+
+    /// The law by distance as it is proposed, and with what it is told wrong.
+    pub fn misled(proposal: &Proposal) -> Vec<Self> {
+        let told = proposal.distance;
+        let cases: [(&str, f64, f64); 5] = [
+            ("as proposed", 1.0, 1.0),
+            ("offset_mm 20 % too small", 0.8, 1.0),
+            ("offset_mm 20 % too large", 1.2, 1.0),
+            ("exponent half as large", 1.0, 0.5),
+            ("exponent half as large again", 1.0, 1.5),
+        ];
+        let case = |(name, offset, exponent): (&str, f64, f64)| {
+            let told = DistanceProposal {
+                offset_mm: told.offset_mm * offset,
+                exponent: told.exponent * exponent,
+                ..told
+            };
+            Self::of(name, &told)
+        };
+        cases.map(case).to_vec()
+    }
+}
