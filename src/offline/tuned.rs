@@ -119,6 +119,16 @@ impl Tuned {
                 one.name, one.stopped
             ));
         }
+        if let [.., pi, distance] = self.predictions.as_slice()
+            && distance.steady_rms_mm > pi.steady_rms_mm
+        {
+            warnings.push(
+                "the law by distance is foretold to be no steadier than the PI law on this cell; \
+                 it needs a robot that follows within a part of the way to the camera (--law pi \
+                 writes the PI law)"
+                    .to_owned(),
+            );
+        }
         let speed = self.plant.speed_for(self.target_mm);
         let (min, max) = (self.limits.min_speed.get(), self.limits.max_speed.get());
         if !(min..=max).contains(&speed) {

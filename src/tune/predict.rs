@@ -57,7 +57,7 @@ pub struct Prediction {
     pub stopped: usize,
     /// Fastest and slowest setpoint after control began \[mm/s\].
     pub speeds_mm_per_s: (f64, f64),
-    /// Width of the first bead along the path \[mm\].
+    /// Width of the first bead along the path, in means over the gauge \[mm\].
     #[serde(skip)]
     pub bead: Vec<(f64, f64)>,
     /// Speed of the robot along the path of the first bead \[mm/s\].
@@ -102,7 +102,8 @@ impl World {
         run.control.target = Target::constant(mm(target_mm));
         cell.target = Some(run.control.target.clone());
         cell.run = Some(run.clone());
-        let band_mm = (2.0 * plant.noise_mm()).max(LEAST_BAND_MM);
+        let rough_mm = plant.scatter.rough * plant.width_mm.value;
+        let band_mm = (2.0 * plant.noise_mm().hypot(rough_mm)).max(LEAST_BAND_MM);
         Self { cell, run, target_mm, band_mm, step_at_mm, end_mm }
     }
 
@@ -164,9 +165,12 @@ impl World {
         let mut laid =
             Laid { begun_mm: f64::INFINITY, setpoints: (0.0, f64::INFINITY), ..Laid::default() };
         let _ = sim.layer(Mm::ZERO, &mut laid);
+        // Of a rough bead no law sees more than the mean over the gauge.
+        let half_mm = 0.5 * cell.simulation.gauge_length.get();
         let mut at = 0.0;
         while at < self.end_mm {
-            laid.bead.extend(sim.bead().width_at(at).map(|width| (at, width)));
+            let width = sim.bead().mean_width(at - half_mm, at + half_mm);
+            laid.bead.extend(width.map(|width| (at, width)));
             at += EVERY_MM;
         }
         Ok(laid)

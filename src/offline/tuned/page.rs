@@ -187,7 +187,7 @@ impl Tuned {
                 h2 { "What is foretold" }
                 p.hint { (format!(
                     "Beads of the cell as it was found, {SEEDS} with each law; the first of them is \
-                     drawn. At {:.0} mm the flow rises by {:.0} %. The table tells the way from \
+                     drawn, in means over the gauge. At {:.0} mm the flow rises by {:.0} %. The table tells the way from \
                      the start of control, and from the flow's step, until the bead is within \
                      {:.2} mm of its target for good, and the RMS error once it is steady and of \
                      all.",

@@ -152,7 +152,8 @@ impl Tuned {
     fn predictions_table(&self, text: &mut String) {
         let _ = writeln!(
             text,
-            "foretold for {} mm, {SEEDS} beads each; settled is within {:.2} mm for good",
+            "foretold for {} mm, {SEEDS} beads each, in means over the gauge; settled is within {:.2} mm \
+             for good",
             self.target_mm, self.band_mm
         );
         let step = format!("flow +{:.0} % settles", 100.0 * FLOW_STEP);
