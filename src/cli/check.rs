@@ -219,7 +219,9 @@ fn about_law(loaded: &LoadedCell, run: &RunPart) {
     if let Some(steps) = loaded.cell.steps(run, &loaded.calibration) {
         let (slow, fast) = steps.speeds();
         say!(
-            "  law          none: steps between {slow} and {fast}, over {:.2} m",
+            "  law          none: steps between {:.1} and {:.1} mm/s, over {:.2} m",
+            slow.get(),
+            fast.get(),
             steps.length().get() / 1e3
         );
     }

@@ -133,7 +133,7 @@ pub fn check_steps(control: &Table<'_>, law: WidthLaw, start: MmPerS, limits: Li
     let (slow, fast) = (start * (1.0 - share), start * (1.0 + share));
     if slow < limits.min_speed || fast > limits.max_speed {
         let (low, high) = (limits.min_speed, limits.max_speed);
-        let found = format!("{share}, which is {slow} to {fast}");
+        let found = format!("{share}, which is {:.1} to {:.1} mm/s", slow.get(), fast.get());
         control.report("step_share", found, format!("speeds within [limits], {low} to {high}"));
     }
 }
