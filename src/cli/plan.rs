@@ -50,6 +50,10 @@ pub struct PlanArgs {
     /// [default: the target width]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     nozzle_mm: Option<f64>,
+    /// How well that length is known: its standard deviation as a share of it; the more, the
+    /// less the plan makes use of it
+    #[arg(long, value_name = "SHARE", default_value_t = 0.3, allow_negative_numbers = true)]
+    nozzle_doubt: f64,
     /// Slowest speed that is planned, and to which a corner of G-code is slowed [mm/s]
     #[arg(long, value_name = "V", default_value_t = 2.0, allow_negative_numbers = true)]
     apex_mm_per_s: f64,
@@ -96,6 +100,7 @@ impl PlanArgs {
             ("--budget-s", Some(self.budget_s), least as fn(f64) -> bool, "0 or more seconds"),
             ("--nozzle-mm", self.nozzle_mm, above, "a length above 0"),
             ("--apex-mm-per-s", Some(self.apex_mm_per_s), above, "a speed above 0"),
+            ("--nozzle-doubt", Some(self.nozzle_doubt), least, "a share of 0 or more"),
             ("--corner-mm", self.corner_mm, least, "a length of 0 or more"),
             ("--unmodelled-share", Some(self.unmodelled_share), least, "a share of 0 or more"),
         ];

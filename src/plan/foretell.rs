@@ -99,7 +99,7 @@ mod tests {
                 drive: CommandLimits::new(0.0, 10.0, 20.0).unwrap(),
                 budget_s: 1.0,
             },
-            bead: Bead { area_mm2: 45.0, nozzle_mm: 20.0 },
+            bead: Bead { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_doubt: 0.0 },
             unmodelled: Unmodelled { share: 0.17, correlation_s: 0.15 },
             extruder: &extruder,
         };

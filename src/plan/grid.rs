@@ -3,6 +3,7 @@
 
 use super::horizon::Window;
 use super::profile::SpeedProfile;
+use super::solve::Bead;
 
 /// A change of the speed of this share of the acceleration is quick.
 const QUICK: f64 = 0.1;
@@ -21,6 +22,8 @@ const FINE_FROM: f64 = 0.6;
 /// the speed which a nozzle's length just hides is not taken for free.
 const FINE_LENGTH: f64 = 0.25;
 const FINE_WEIGHT: f64 = 0.003;
+/// Largest share by which the nozzle's length is thought to be off.
+const MOST_AWAY: f64 = 0.75;
 /// Within how far of a quick change noise is weighed, in lengths of the nozzle.
 const NEAR: f64 = 5.0;
 /// How far before and after the quick changes the flow's change is taken, in lengths of
@@ -113,14 +116,15 @@ impl Quick {
     }
 
     /// Where the width is judged, over pieces that lie within a stretch \[mm\].
-    pub fn windows(&self, (from, to): (f64, f64), nozzle_mm: f64) -> Vec<Window> {
+    pub fn windows(&self, (from, to): (f64, f64), bead: &Bead) -> Vec<Window> {
         let mut all = Vec::new();
+        let nozzle_mm = bead.nozzle_mm;
         let fine = FINE_LENGTH * nozzle_mm;
-        let sets = [
-            (nozzle_mm, 1.0, &PLACES, f64::NEG_INFINITY),
-            (fine, FINE_WEIGHT, &FINE_PLACES, FINE_FROM * nozzle_mm),
-        ];
-        for (length_mm, weight, steps, beyond) in sets {
+        let fine = (fine, FINE_WEIGHT, &FINE_PLACES, FINE_FROM * nozzle_mm);
+        let lengths = lengths(bead).into_iter();
+        let whole =
+            lengths.map(|(length_mm, weight)| (length_mm, weight, &PLACES, f64::NEG_INFINITY));
+        for (length_mm, weight, steps, beyond) in whole.chain([fine]) {
             let inside = (from + 0.5 * length_mm, to - 0.5 * length_mm);
             if inside.1 <= inside.0 {
                 continue;
@@ -139,6 +143,17 @@ impl Quick {
         }
         all
     }
+}
+
+/// Lengths over which the nozzle may average \[mm\] and how likely each is: three that have
+/// the mean and the standard deviation of what is known.
+fn lengths(bead: &Bead) -> Vec<(f64, f64)> {
+    let Bead { nozzle_mm, nozzle_doubt, .. } = *bead;
+    if nozzle_doubt <= 0.0 {
+        return vec![(nozzle_mm, 1.0)];
+    }
+    let away = nozzle_mm * (nozzle_doubt * std::f64::consts::SQRT_2).min(MOST_AWAY);
+    vec![(nozzle_mm - away, 0.25), (nozzle_mm, 0.5), (nozzle_mm + away, 0.25)]
 }
 
 /// Places within a stretch at which a profile's acceleration changes \[mm\].
@@ -199,7 +214,8 @@ mod tests {
     #[test]
     fn the_windows_weigh_what_the_path_is_long() {
         let quick = Quick::of(&corner(), 2000.0);
-        let windows = quick.windows((-200.0, 250.0), 20.0);
+        let bead = Bead { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_doubt: 0.0 };
+        let windows = quick.windows((-200.0, 250.0), &bead);
         let coarse = windows.iter().filter(|w| w.length_mm == 20.0);
         let sum: f64 = coarse.map(|w| w.weight).sum();
         assert!((sum - 430.0).abs() < 1e-9, "{sum}");

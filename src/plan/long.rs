@@ -130,7 +130,7 @@ impl<'a> Long<'a> {
             bead: self.task.bead,
             unmodelled: self.task.unmodelled,
             drive_span: max - min,
-            windows: self.quick.windows(span, self.task.bead.nozzle_mm),
+            windows: self.quick.windows(span, &self.task.bead),
             changed: self.quick.about(span, self.task.bead.nozzle_mm),
             path,
             from_s,

@@ -35,6 +35,9 @@ pub struct Bead {
     pub area_mm2: f64,
     /// Length over which the nozzle averages what it lays \[mm\].
     pub nozzle_mm: f64,
+    /// Standard deviation of that length, as a share of it: the more, the less a plan makes
+    /// use of it.
+    pub nozzle_doubt: f64,
 }
 
 /// The flow that no model tells.

@@ -37,8 +37,9 @@ pub const JUDGED_MM: f64 = 100.0;
 /// Share of the change's standard deviation that no model tells, and how long it hangs
 /// together \[s\].
 pub const UNMODELLED: Unmodelled = Unmodelled { share: 0.17, correlation_s: 0.15 };
-/// The bead.
-pub const BEAD: Bead = Bead { area_mm2: 45.0, nozzle_mm: 20.0 };
+/// The bead. Its length is given; a plan that counted on it to the last percent would be of
+/// little use for any other.
+pub const BEAD: Bead = Bead { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_doubt: 0.07 };
 
 /// The corner and what may be done about it.
 #[derive(Debug, Clone, Copy, PartialEq)]

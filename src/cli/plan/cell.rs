@@ -119,7 +119,11 @@ impl Extruder {
         };
         plan::Task {
             limits: plan::Limits { robot, drive: self.drive, budget_s: args.budget_s },
-            bead: plan::Bead { area_mm2: self.facts.area_mm2, nozzle_mm: self.nozzle_mm },
+            bead: plan::Bead {
+                area_mm2: self.facts.area_mm2,
+                nozzle_mm: self.nozzle_mm,
+                nozzle_doubt: args.nozzle_doubt,
+            },
             unmodelled: plan::Unmodelled {
                 share: args.unmodelled_share,
                 correlation_s: CORRELATION_S,

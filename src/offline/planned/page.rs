@@ -76,8 +76,8 @@ fn section(bead: &PlannedBead, facts: &Facts) -> Markup {
         section {
             h2 { (bead.name) }
             p.hint { "Foretold from the model, as the mean over the nozzle's length; what no model \
-                tells comes on top. Dips of the speed a nozzle's length apart count on that length: \
-                tell it as it is." }
+                tells comes on top. Dips of the speed a nozzle's length apart count on that length; \
+                a larger --nozzle-doubt has fewer of them." }
             (plot("width [mm]", &path, &widths, Some(facts.width_mm)))
             (plot("speed [mm/s]", &path, &speeds, None))
             (plot("flow [mm³/s]", &path, &flows, None))
