@@ -12,7 +12,7 @@ mod tests;
 mod tower;
 
 pub use contender::{Contender, Rates};
-pub use disturbed::{Disturbance, Wrong, step_settles, unrest, wrong};
+pub use disturbed::{Borne, Disturbance, Wrong, step_settles, unrest, wrong};
 pub use layers::{LayerResult, lay, settles_unseen, with_frames};
 pub use stack::{Stack, stack};
 pub use stand_off::{StandOff, camera_above, stand_off};

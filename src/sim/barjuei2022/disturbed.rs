@@ -115,14 +115,22 @@ impl Wrong {
     pub const NOTHING: Self = Self { offset: 1.0, outliers: 0.0, missing: 0.0 };
 }
 
-/// Root mean square error of the bead from 500 mm after control began \[mm\],
-/// as the median over seeds.
+/// Root mean square errors of many beads \[mm\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Borne {
+    /// Their median.
+    pub median_mm: f64,
+    /// Their mean, in which one bead that goes astray shows.
+    pub mean_mm: f64,
+}
+
+/// Root mean square error of the bead from 500 mm after control began, over seeds.
 pub fn wrong(
     (cell, run): (&Cell, &RunPart),
     who: Contender,
     what: Wrong,
     seeds: u64,
-) -> Result<f64, SimError> {
+) -> Result<Borne, SimError> {
     let (mut cell, run) = who.enter(cell, run, TARGET_MM);
     cell.simulation.outlier_share = what.outliers;
     cell.simulation.missing_share = what.missing;
@@ -131,7 +139,8 @@ pub fn wrong(
         let trial = Trial::lay_told((&cell, &run), &scale(), told, seed)?;
         Ok(trial.rms_error(trial.begun_mm + 500.0))
     })?;
-    Ok(median(&mut found))
+    let mean_mm = mean(found.iter().copied());
+    Ok(Borne { median_mm: median(&mut found), mean_mm })
 }
 
 /// A number of every seed, in parallel.

@@ -174,8 +174,16 @@ fn by_distance_what_is_told_wrong_and_widths_that_are_wrong_are_borne() {
         ];
         for (exponent, what) in cases {
             let found = told(rates, exponent, what);
-            let ratio = found / nominal;
-            assert!(ratio <= 1.5, "{rates:?}, b {exponent}, {what:?}: {found} is {ratio}");
+            let ratio = found.median_mm / nominal.median_mm;
+            assert!(ratio <= 1.5, "{rates:?}, b {exponent}, {what:?}: {found:?} is {ratio}");
+            let ratio = found.mean_mm / nominal.mean_mm;
+            assert!(ratio <= 1.5, "{rates:?}, b {exponent}, {what:?}: {found:?} is {ratio}");
+        }
+        // All of it at once, in any direction.
+        for (exponent, offset) in [(0.375, 1.2), (0.125, 1.2), (0.375, 0.8), (0.125, 0.8)] {
+            let found = told(rates, exponent, Wrong { offset, outliers: 0.1, missing: 0.2 });
+            let ratio = found.median_mm / nominal.median_mm;
+            assert!(ratio <= 1.8, "{rates:?}, b {exponent}, {offset}: {found:?} is {ratio}");
         }
     }
 }

@@ -122,6 +122,7 @@ impl Experiments {
     /// A controller that is told wrong, and a camera that sees wrong.
     fn told_wrong(&mut self) -> Result<(), ReproduceError> {
         let offset = |factor| Wrong { offset: factor, ..Wrong::NOTHING };
+        let all = |factor| Wrong { offset: factor, outliers: 0.1, missing: 0.2 };
         let cases = [
             ("nothing wrong", 0.25, Wrong::NOTHING),
             ("distance 20 % too long", 0.25, offset(1.2)),
@@ -130,14 +131,22 @@ impl Experiments {
             ("b 50 % too small", 0.125, Wrong::NOTHING),
             ("one width in ten an outlier", 0.25, Wrong { outliers: 0.1, ..Wrong::NOTHING }),
             ("one width in five missing", 0.25, Wrong { missing: 0.2, ..Wrong::NOTHING }),
+            ("all of it, too long and too large", 0.375, all(1.2)),
+            ("all of it, too long and too small", 0.125, all(1.2)),
+            ("all of it, too short and too large", 0.375, all(0.8)),
+            ("all of it, too short and too small", 0.125, all(0.8)),
         ];
         for (rates, name) in COLUMNS {
             for (what, exponent, told) in cases {
                 let who = Contender::Distance(rates, exponent);
                 let found = wrong((&self.cell, &self.run), who, told, self.seeds)?;
                 let case = format!("42 mm, {what}, {name}");
-                let quantity = ("RMS error of the bead once settled", "mm");
-                self.rows.push(case, quantity, [None, None, Some(found)]);
+                for (quantity, found) in [
+                    ("RMS error of the bead once settled", found.median_mm),
+                    ("the same, mean over seeds", found.mean_mm),
+                ] {
+                    self.rows.push(case.clone(), (quantity, "mm"), [None, None, Some(found)]);
+                }
             }
         }
         Ok(())
