@@ -190,21 +190,6 @@ fn a_change_that_was_a_glare_is_undone_by_the_first_widths_after_it() {
 }
 
 #[test]
-fn a_rough_bead_is_not_chased() {
-    // Waves of 5 and 11 mm that no speed can take out, 0.7 mm in root mean square.
-    let rough = |at: f64| 1.0 + 0.017 * (at / 5.0).sin() + 0.017 * (at / 11.3 + 1.0).sin();
-    let mut line = Line::new(settings());
-    while line.path < 2500.0 {
-        let _ = line.step(0.25, rough, 0.2);
-    }
-    let late = line.laid.iter().filter(|(at, _)| *at > 500.0);
-    let (sum, count) = late
-        .fold((0.0, 0.0), |(sum, count), (_, width)| (sum + (width - TARGET).powi(2), count + 1.0));
-    let rms: f64 = f64::sqrt(sum / count);
-    assert!(rms < 1.25 * 0.017 * TARGET, "{rms}");
-}
-
-#[test]
 fn a_width_that_was_laid_while_the_flow_was_changed_far_says_nothing() {
     let mut law = ByDistance::new(settings());
     let mut uses = Vec::new();

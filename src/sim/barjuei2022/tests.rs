@@ -201,3 +201,21 @@ fn twenty_layers_are_measured_alike_at_every_height() {
     // The first layer teaches the bead; those above begin with what it taught.
     assert!(storeys[1..].iter().all(|storey| storey.laid_error_mm.abs() < 0.03), "{storeys:?}");
 }
+
+#[test]
+fn by_distance_a_rough_bead_is_not_chased() {
+    let (mut cell, run) = cell();
+    cell.simulation.roughness.size_mm = 0.5;
+    cell.simulation.roughness.length_mm = 8.0;
+    let nobody = Contender::Paper.enter(&cell, &run, 42.0);
+    let (cell, mut run) = Contender::by_distance(RATES[1]).enter(&nobody.0, &run, 42.0);
+    let scatter = |run: &RunPart| {
+        let square = |seed| Trial::lay(&cell, run, &scale(), seed).unwrap().scatter(700.0).powi(2);
+        ((0..SEEDS).map(square).sum::<f64>() / f64::from(u32::try_from(SEEDS).unwrap())).sqrt()
+    };
+    let held = scatter(&run);
+    // The same bead at a steady speed.
+    run.robot.start_length = Mm::constant(1e5);
+    let alone = scatter(&run);
+    assert!(held < 1.2 * alone, "{held} beside {alone}");
+}
