@@ -82,6 +82,12 @@ fn a_plan_for_another_cell_is_refused_before_anything_moves() {
     for (from, to, told) in [
         ("min_speed_mm_per_s = 2.0", "min_speed_mm_per_s = 20.0", "--apex-mm-per-s 20"),
         ("max_rpm = 60.0", "max_rpm = 50.0", "limits of [extruder]"),
+        ("max_rpm_per_s = 200.0", "max_rpm_per_s = 100.0", "rpm a second, expected 100 at most"),
+        (
+            "max_accel_mm_per_s2 = 500.0",
+            "max_accel_mm_per_s2 = 300.0",
+            "mm/s², expected 300 at most",
+        ),
         ("layer_height_mm = 1.5", "layer_height_mm = 1.2", "plan again with this cell"),
         (
             "strategy = \"feedforward\"",

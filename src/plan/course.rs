@@ -10,6 +10,9 @@ use crate::identify::quantity::Unit;
 use crate::time::Span;
 use crate::units::{Mm, Mm3PerS, MmPerS};
 
+/// Rows nearer to each other tell no rate \[s\].
+const CLOSEST_S: f64 = 1e-3;
+
 /// What is planned for one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Row {
@@ -73,6 +76,24 @@ impl PlannedJob {
     /// Commands, in their unit.
     pub fn commands(&self) -> Range {
         self.range(|row| row.command)
+    }
+
+    /// Largest acceleration, either way \[mm/s²\].
+    pub fn steepest_speed(&self) -> f64 {
+        self.steepest(|row| row.speed_mm_per_s)
+    }
+
+    /// Fastest change of the command, either way, in its unit per second.
+    pub fn steepest_command(&self) -> f64 {
+        self.steepest(|row| row.command)
+    }
+
+    fn steepest(&self, of: impl Fn(&Row) -> f64) -> f64 {
+        let pairs =
+            self.beads.iter().flat_map(|bead| bead.rows.iter().zip(bead.rows.iter().skip(1)));
+        // Rows that lie closer than this are even to what their digits tell.
+        let apart = pairs.filter(|(a, b)| b.time_s - a.time_s >= CLOSEST_S);
+        apart.map(|(a, b)| (of(b) - of(a)).abs() / (b.time_s - a.time_s)).fold(0.0, f64::max)
     }
 
     fn range(&self, of: impl Fn(&Row) -> f64) -> Range {

@@ -125,14 +125,16 @@ impl World {
             let mut ways: Vec<f64> = laid.iter().map(way).collect();
             crate::vision::rank::median(&mut ways).filter(|way| way.is_finite())
         };
-        let steady = |one: &Laid| one.begun_mm + (1.0 - STEADY) * (self.step_at_mm - one.begun_mm);
+        // A mean over the gauge knows of the step half a gauge before it.
+        let calm_mm = self.step_at_mm - 0.5 * self.cell.simulation.gauge_length.get();
+        let steady = |one: &Laid| one.begun_mm + (1.0 - STEADY) * (calm_mm - one.begun_mm);
         let speeds = laid.iter().map(|one| one.setpoints);
         let speeds = speeds.reduce(|a, b| (a.0.max(b.0), a.1.min(b.1))).unwrap_or_default();
         Ok(Prediction {
             name: who.name.clone(),
-            start_settles_mm: median(&|one| self.settles(one, one.begun_mm, self.step_at_mm)),
+            start_settles_mm: median(&|one| self.settles(one, one.begun_mm, calm_mm)),
             step_settles_mm: median(&|one| self.settles(one, self.step_at_mm, self.end_mm)),
-            steady_rms_mm: square(&steady, self.step_at_mm),
+            steady_rms_mm: square(&steady, calm_mm),
             whole_rms_mm: square(&|one| one.begun_mm, self.end_mm),
             stopped: laid.iter().filter(|one| one.stopped).count(),
             speeds_mm_per_s: speeds,

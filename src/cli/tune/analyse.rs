@@ -17,6 +17,10 @@ use crate::units::Mm;
 /// Smallest range of distances that is a range \[mm\].
 const SHORTEST_SEARCH_MM: f64 = 20.0;
 
+/// How far beyond the limits, as a factor, the target's speed may lie for anything to be
+/// foretold.
+const FAR: f64 = 3.0;
+
 /// Reads a recording and looks at it with the eyes of a cell.
 pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<Tuned> {
     if farthest.get() < SHORTEST_SEARCH_MM {
@@ -48,6 +52,16 @@ pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<T
         };
         format!("{name} does not tell what the cell is like{extruder}")
     })?;
+    let target = run.control.target.nominal();
+    let speed = plant.speed_for(target.get());
+    let (min, max) = (run.limits.min_speed.get(), run.limits.max_speed.get());
+    if !(min / FAR..=max * FAR).contains(&speed) {
+        anyhow::bail!(
+            "{name}: its bead would be {target} wide at {speed:.1} mm/s, far from the {min} to {max} \
+             mm/s of [limits] in {}: give the cell that was recorded, or a target near its bead",
+            loaded.path.display()
+        );
+    }
     Ok(Tuned::of(name, loaded.path.display().to_string(), log, plant, &loaded.cell, run)?)
 }
 

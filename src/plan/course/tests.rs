@@ -43,6 +43,8 @@ fn a_plan_is_read_by_place_and_goes_on_at_its_ends() {
     close(bead.at(Mm::constant(500.0)).flow.get(), 80.0);
     assert_eq!(job.commands().1, 30.0);
     close(job.speeds().0, 20.0);
+    close(job.steepest_speed(), 80.0);
+    close(job.steepest_command(), 20.0);
 }
 
 #[test]

@@ -10,6 +10,8 @@ use crate::plan::PlannedJob;
 
 /// How far the section of a plan may lie from the cell's, as a share.
 const SAME_SECTION: f64 = 0.02;
+/// Rates may be passed by as much as a table rounds.
+const STEEPER: f64 = 1.02;
 /// Limits may be passed by as much as a table rounds \[mm/s, or the command's unit\].
 const ROUNDED: f64 = 1e-3;
 
@@ -42,7 +44,21 @@ pub fn plan(
     if low < min - ROUNDED || high > max + ROUNDED {
         return Err(wrong(format!(
             "found commands from {low:.4} to {high:.4} {unit}, expected {min} to {max}, the limits \
-             of [extruder]"
+             of [extruder]: plan again with this cell"
+        )));
+    }
+    let (accel, most) = (job.steepest_speed(), limits.max_accel.get());
+    if accel > most * STEEPER {
+        return Err(wrong(format!(
+            "found an acceleration of {accel:.0} mm/s², expected {most} at most, the [limits]: plan \
+             again with this cell"
+        )));
+    }
+    let (rate, most) = (job.steepest_command(), part.extruder.limits.rate_per_s());
+    if rate > most * STEEPER {
+        return Err(wrong(format!(
+            "found a command that changes by {rate:.1} {unit} a second, expected {most} at most, \
+             the limit of [extruder]: plan again with this cell"
         )));
     }
     let wanted = part.demand.nominal().get() / run.robot.start_speed.get();
