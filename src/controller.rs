@@ -5,8 +5,8 @@
 //! - priming: first stretch of a bead, at the start speed.
 //! - tracking: the width is held by distance, or by the PI law, once a width of
 //!   this bead has been seen; or the speed goes through a course of steps.
-//! - holding: the speed stays as it is, for a reason; left when the reason
-//!   goes, and a fault when it stays too long.
+//! - holding: the speed stays as it is, for a reason, but for what a plan, a start or
+//!   a stop makes of it; left when the reason goes, and a fault when it stays too long.
 //! - fault: the robot is told to stop; left when the robot is idle again.
 
 mod by_distance;
@@ -17,6 +17,7 @@ mod robot;
 mod track;
 
 use extrude::ExtruderSide;
+use planned::UNPACED;
 
 use crate::calib::Calibration;
 use crate::config::Cell;
@@ -164,11 +165,15 @@ pub struct Controller {
     verdict: Verdict,
     /// Where on the path the bead began.
     bead_start: Mm,
-    /// Beads that were begun.
+    /// How much of it was laid.
+    laid: Mm,
+    /// Beads of a plan that were laid before this one.
     beads: usize,
     stretch: Stretch,
     /// The last setpoint of this bead, and when it was given.
     told: Option<(Stamp, MmPerS)>,
+    /// What stood behind it before a plan, a start or a stop had its say.
+    asked: Option<MmPerS>,
     limit: Limit,
 }
 
@@ -192,9 +197,11 @@ impl Controller {
             follow: Follow::default(),
             verdict: Verdict::Follows,
             bead_start: Mm::ZERO,
+            laid: Mm::ZERO,
             beads: 0,
             stretch: Stretch::RunUp,
             told: None,
+            asked: None,
             limit: Limit::None,
         }
     }
@@ -292,8 +299,8 @@ impl Controller {
             return None;
         }
         self.begin_by_distance(now);
-        let kept = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
-        let speed = match &self.phase {
+        let kept = self.asked.unwrap_or(self.setup.start_speed);
+        let asked = match &self.phase {
             Phase::Idle => return None,
             Phase::Fault { .. } => return Some(Command::Stop),
             Phase::Priming => self.setup.start_speed,
@@ -304,12 +311,10 @@ impl Controller {
             Phase::Tracking { by: Steering::Steps, .. } => self.speed_by_steps(now, trace),
             Phase::Holding { .. } => kept,
         };
-        trace.demand_mm_per_s = Some(speed);
-        // A hold keeps the speed as it is, whatever flows.
-        let speed = match self.phase {
-            Phase::Holding { .. } => speed,
-            _ => self.paced(now, speed).unwrap_or(kept),
-        };
+        trace.demand_mm_per_s = Some(asked);
+        let pace = self.pace(now);
+        let last = self.told.map_or(asked, |(_, speed)| speed);
+        let speed = pace.map_or(last, |pace| asked * pace);
         let (last_at, last) = self.told.unwrap_or((now, speed));
         let limited = self.setup.limits.apply(speed, last, now - last_at);
         self.limit = match (limited.limit, self.verdict) {
@@ -318,6 +323,9 @@ impl Controller {
             (limit, _) => limit,
         };
         self.told = Some((now, limited.speed));
+        // What a hold is to keep: the very speed that goes out, or where something else has
+        // its say in it, what the width was to have.
+        self.asked = Some(if pace == Some(UNPACED) { limited.speed } else { asked });
         Some(Command::Speed(limited.speed))
     }
 

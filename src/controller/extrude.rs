@@ -69,8 +69,9 @@ impl Controller {
             Phase::Priming | Phase::Tracking { .. } | Phase::Holding { .. } => {
                 let told = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
                 // No extruder keeps up with a robot that starts; it is ready for
-                // the speed that comes.
-                let robot = self.robot.filter(|_| self.stretch != Stretch::RunUp);
+                // the speed that comes. Nor does it follow a robot that goes by its flow.
+                let goes_ahead = self.stretch == Stretch::RunUp || supervisor.is_passing();
+                let robot = self.robot.filter(|_| !goes_ahead);
                 let robot = robot.map(|robot| (told, robot.speed_mm_per_s));
                 let flow =
                     self.planned(now).map_or_else(|| demand.wanted(robot), |planned| planned.flow);

@@ -4,13 +4,29 @@ use super::by_distance::ROBOT_LAG;
 use super::{Controller, ExtruderSide};
 use crate::plan::{Planned, PlannedCourse};
 use crate::time::Stamp;
-use crate::units::{Mm, MmPerS};
+use crate::units::Mm;
+
+/// The pace of a robot that goes by nothing but the width.
+pub(super) const UNPACED: f64 = 1.0;
+/// Share of its plan from which a bead was laid: the robot's last report comes a little
+/// before its end.
+const WHOLE: f64 = 0.9;
 
 impl Controller {
     /// The plan of the bead that is being laid.
     fn course(&self) -> Option<&PlannedCourse> {
         let plan = self.extruder.as_ref()?.plan.as_ref()?;
-        Some(plan.bead(self.beads.saturating_sub(1)).as_ref())
+        Some(plan.bead(self.beads).as_ref())
+    }
+
+    /// The next bead begins. One that was broken off, by whatever it was, is laid again:
+    /// no robot says which bead of its program it begins.
+    pub(super) fn next_bead(&mut self) {
+        let laid = self.laid;
+        if self.course().is_some_and(|course| laid >= course.end() * WHOLE) {
+            self.beads += 1;
+        }
+        self.laid = Mm::ZERO;
     }
 
     /// What is planned for where the nozzle is now.
@@ -18,15 +34,15 @@ impl Controller {
         Some(self.course()?.at(self.nozzle(now)?))
     }
 
-    /// What becomes of a speed of the width controller, which is one for the start
-    /// speed's flow, where a plan, a start or a stop has the robot go slower or faster;
-    /// none where it is not known how far along its plan the robot is.
-    pub(super) fn paced(&self, now: Stamp, speed: MmPerS) -> Option<MmPerS> {
-        let share = self.extruder.as_ref().map_or(1.0, |side| side.supervisor.robot_share());
-        let Some(course) = self.course() else { return Some(speed * share) };
+    /// The share of a speed of the width controller, which is one for the start speed's
+    /// flow, at which a plan, a start or a stop has the robot go; none where it is not
+    /// known how far along its plan the robot is.
+    pub(super) fn pace(&self, now: Stamp) -> Option<f64> {
+        let share = self.extruder.as_ref().map_or(UNPACED, |side| side.supervisor.robot_share());
+        let Some(course) = self.course() else { return Some(share) };
         let path = self.nozzle(now)? + self.robot?.speed_mm_per_s * ROBOT_LAG;
         let planned = course.speed(path, self.setup.setpoint_period);
-        Some(speed * (share * (planned / self.setup.start_speed)))
+        Some(share * (planned / self.setup.start_speed))
     }
 
     /// The flow at the nozzle over that of the start speed, by which the bead is wider than

@@ -32,6 +32,7 @@ impl Controller {
         self.phase = Phase::Idle;
         self.stretch = Stretch::RunUp;
         self.told = None;
+        self.asked = None;
         self.limit = Limit::None;
         self.follow.reset();
         self.verdict = Verdict::Follows;
@@ -55,7 +56,7 @@ impl Controller {
             self.bead_start = state.path_mm;
             self.phase = Phase::Priming;
             self.fallback = None;
-            self.beads += 1;
+            self.next_bead();
             if let Some(law) = &mut self.distance {
                 law.begin_bead();
             }
@@ -63,6 +64,7 @@ impl Controller {
                 steps.begin_bead();
             }
         }
+        self.laid = state.path_mm - self.bead_start;
         let share = self.flow_share(now);
         if let Some(law) = &mut self.distance {
             law.reported(now, state.path_mm, state.speed_mm_per_s, share);

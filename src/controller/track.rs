@@ -1,5 +1,6 @@
 //! Widths: where the bead in a frame was laid, and what the laws make of it.
 
+use super::planned::UNPACED;
 use super::{Controller, Phase, Steering};
 use crate::control::follow::Verdict;
 use crate::control::pi::{Demand, Pi, Saturation};
@@ -88,8 +89,8 @@ impl Controller {
         let start_speed = self.setup.start_speed;
         let driven = self.robot.map_or(start_speed, |robot| robot.speed_mm_per_s);
         // A robot that goes by the flow or by a plan is slower or faster than the law says.
-        let paced = self.paced(now, start_speed).unwrap_or(start_speed);
-        let own = driven * (1.0 / (paced / start_speed).max(LEAST_SHARE));
+        let pace = self.pace(now).unwrap_or(UNPACED);
+        let own = driven * (1.0 / pace.max(LEAST_SHARE));
         let mut pi = Pi::start_bumpless(self.setup.gains(), own, error);
         let demand = pi.step(error, Span::ZERO, Saturation::None);
         trace.note(&demand);

@@ -12,6 +12,7 @@
 //! - fault: the pump is stopped; left when the robot is idle again, and where
 //!   the pump runs on all the same, not before it says that it stops.
 
+mod bead;
 mod pause;
 mod watch;
 
@@ -200,6 +201,11 @@ impl Supervisor {
         self.shares.map_or_else(|| self.foretold_share(), |shares| shares.flow)
     }
 
+    /// Whether a start or a stop is on its way, by which the robot goes.
+    pub const fn is_passing(&self) -> bool {
+        self.shares.is_some()
+    }
+
     /// How far from the end of a bead that is laid at this speed the pump is to stop;
     /// none where nothing is known of stops.
     pub fn way_of_stop(&self, speed: MmPerS) -> Option<Mm> {
@@ -283,98 +289,6 @@ impl Supervisor {
         // the end of a bead what was to fill it.
         let open = on || self.relieving || self.phase == Phase::Ending;
         ExtruderCommand { pump_on: on, valve_open: open, value }
-    }
-
-    fn rest(&mut self) {
-        self.phase = Phase::Off;
-        self.applied = self.setup.limits.idle();
-        self.controlled = None;
-        self.follow.reset();
-        self.trace = ExtruderTrace::default();
-        self.shares = None;
-        if let Some(pauses) = &mut self.pauses {
-            pauses.rest();
-        }
-    }
-
-    /// Stops the pump early.
-    fn run_out(&mut self, now: Stamp, flow: Mm3PerS) {
-        let Some(pauses) = &mut self.pauses else { return };
-        match self.phase {
-            Phase::Off | Phase::Fault(_) => return,
-            Phase::Ending => {}
-            Phase::Starting { .. } | Phase::Running | Phase::Holding { .. } => {
-                pauses.end(now);
-                self.phase = Phase::Ending;
-                self.follow.reset();
-            }
-        }
-        self.shares = pauses.shares(now);
-        self.trace = ExtruderTrace { flow_mm3_per_s: flow, ..ExtruderTrace::default() };
-        self.trace.foretold_mm3_per_s = self.shares.map(|shares| flow * shares.flow);
-    }
-
-    fn lay(&mut self, now: Stamp, dt: Span, flow: Mm3PerS) {
-        if self.phase == Phase::Ending {
-            self.rest();
-        }
-        self.trace.flow_mm3_per_s = flow;
-        if self.phase == Phase::Off {
-            self.begin(now, flow);
-        }
-        self.lose_patience(now);
-        self.rise(now, flow);
-        match self.phase {
-            Phase::Running if self.shares.is_some() => {}
-            Phase::Running => self.drive(now, dt, flow),
-            Phase::Holding { why, .. } => {
-                self.setup.law.strategy_mut().wait(dt);
-                if why == ExtruderHold::BadReading && self.usable && self.answer(now) == Some(true)
-                {
-                    self.resume(now);
-                }
-            }
-            Phase::Off | Phase::Starting { .. } | Phase::Ending | Phase::Fault(_) => {}
-        }
-        self.trace.foretold_mm3_per_s = match self.shares {
-            Some(shares) => Some(flow * shares.flow),
-            None => self.setup.law.strategy().foretold(),
-        };
-    }
-
-    /// Where the flow of a start is by now. While it comes the law stands: what is told
-    /// of starts is told of a steady command.
-    fn rise(&mut self, now: Stamp, flow: Mm3PerS) {
-        let Some(pauses) = &mut self.pauses else { return };
-        pauses.want(flow);
-        let rises = pauses.shares(now);
-        if rises.is_none() && self.shares.is_some() {
-            self.setup.law.strategy_mut().flows(now, self.applied);
-        }
-        self.shares = rises;
-    }
-
-    /// Begins a bead. Its first command is no change of another and has no
-    /// rate.
-    fn begin(&mut self, now: Stamp, flow: Mm3PerS) {
-        self.phase = Phase::Starting { since: now };
-        self.begun = now;
-        if let Some(pauses) = &mut self.pauses {
-            pauses.begin(now);
-        }
-        self.stand(now, flow);
-    }
-
-    /// Stands where the law begins.
-    fn stand(&mut self, now: Stamp, flow: Mm3PerS) {
-        let wish = self.setup.law.strategy_mut().begin(now, flow);
-        let (low, high) = self.setup.limits.range();
-        self.applied = if wish.value.is_finite() {
-            wish.value.clamp(low, high)
-        } else {
-            self.setup.limits.idle()
-        };
-        self.note(wish, CommandLimit::None);
     }
 
     fn drive(&mut self, now: Stamp, dt: Span, flow: Mm3PerS) {

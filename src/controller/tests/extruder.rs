@@ -195,3 +195,81 @@ fn a_bead_right_behind_another_keeps_the_pump_running() {
     assert_eq!(cell.go(1.0), ExtruderState::Running);
     assert!(cell.sent[sent..].iter().all(|(_, command)| command.pump_on));
 }
+
+/// A bead of 1 m and one of 500 mm, both half as fast from the middle of the longer one on.
+const PLAN: &str = "\
+bead,time_s,path_mm,speed_mm_per_s,command_rpm,flow_mm3_per_s
+1,0,0,112.5,30,1125
+1,4.4,495,112.5,30,1125
+1,4.5,503.4375,56.25,15,562.5
+1,13.3277778,1000,56.25,15,562.5
+2,0,0,112.5,30,1125
+2,4.44444,500,112.5,30,1125
+";
+
+fn planned() -> Cell {
+    let (setup, demand) = rig(Law::Constant(Constant(30.0)));
+    let plan = Some(std::sync::Arc::new(crate::plan::PlannedJob::parse(PLAN).unwrap()));
+    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    // The test puts the robot elsewhere, which no real one does: its speed jumps, too.
+    let limits = Limits {
+        min_speed: MmPerS::constant(10.0),
+        max_accel: MmPerS2::constant(1e5),
+        ..super::setup().limits
+    };
+    cell.line = Line::of(Setup { limits, ..super::setup() });
+    cell.line.controller =
+        cell.line.controller.with_extruder(ExtruderSetup { plan, ..setup }, demand);
+    cell.mode = RobotMode::Print;
+    cell
+}
+
+#[test]
+fn a_hold_goes_on_with_the_plan_and_keeps_the_width_controllers_part() {
+    let mut cell = planned();
+    let _ = cell.go(2.0);
+    // Too wide, which the controller answers with more speed.
+    let mut asked = cell.line.tick().unwrap();
+    for _ in 0..6 {
+        let _ = cell.line.width(46.0);
+        asked = cell.line.tick().unwrap();
+        let _ = cell.go(0.05);
+    }
+    assert!(asked > SPEED * 1.03, "{asked}");
+    let lost = Event::CameraLost { reason: "unplugged".into() };
+    assert!(matches!(cell.line.give(&lost).state, State::Holding(_)));
+    let held = cell.line.tick().unwrap();
+    assert!((held / asked - 1.0).abs() < 1e-6, "{held} after {asked}");
+    // Behind the plan's step, still held.
+    cell.path = 550.0;
+    let _ = cell.go(0.02);
+    let slowed = cell.line.tick().unwrap();
+    assert!(matches!(cell.line.controller.state(), State::Holding(_)));
+    assert!((slowed / (asked / 2.0) - 1.0).abs() < 1e-6, "{slowed} after {asked}");
+}
+
+#[test]
+fn a_bead_that_was_broken_off_is_planned_again_and_one_that_was_laid_is_not() {
+    let mut cell = planned();
+    let halfway = |cell: &mut Cell| {
+        (cell.mode, cell.path) = (RobotMode::Print, 0.0);
+        let _ = cell.go(0.02);
+        cell.path = 600.0;
+        let _ = cell.go(0.02);
+        cell.line.tick().unwrap()
+    };
+    let rest = |cell: &mut Cell| {
+        cell.mode = RobotMode::Idle;
+        let _ = cell.go(0.1);
+    };
+    for _ in 0..2 {
+        assert!((halfway(&mut cell) - SPEED / 2.0).abs() < 1e-3);
+        rest(&mut cell);
+    }
+    let _ = halfway(&mut cell);
+    cell.path = 995.0;
+    let _ = cell.go(0.02);
+    rest(&mut cell);
+    // The second bead's plan is at its end there, and slows down nowhere.
+    assert!((halfway(&mut cell) - SPEED).abs() < 1e-3);
+}
