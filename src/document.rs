@@ -1,6 +1,7 @@
 //! A cursor over a TOML file that takes what it is asked for and collects
 //! every violation on the way, with its line, instead of ending at the first.
 
+pub mod csv;
 mod problem;
 mod table;
 mod value;

@@ -110,6 +110,34 @@ fn a_plan_for_another_cell_is_refused_before_anything_moves() {
 }
 
 #[test]
+fn gcode_is_planned_for_a_cell_that_starts_its_beads_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let lay = |plan: &Path, code: i32| {
+        let here = format!("plan = \"{}\"", plan.join("plan.csv").display());
+        let shipped = format!("plan = \"{ROOT}/jobs/corner-plan.csv\"");
+        let changes = [(shipped.as_str(), here.as_str()), ("path_mm = 700.0", "path_mm = 800.0")];
+        simulate(folder.path(), CORNER, &changes, code)
+    };
+    let plan = |out: &Path, more: &[&str]| {
+        let job = format!("{ROOT}/jobs/corner.gcode");
+        let cell = cell(folder.path(), CORNER, &[]);
+        let mut command = truebead(&["plan", &job, "--cell", &cell, "--nozzle-mm", "20", "--out"]);
+        said(command.arg(out).args(more), 0)
+    };
+    let (rest, moving) = (folder.path().join("rest"), folder.path().join("moving"));
+    plan(&rest, &[]);
+    let words = lay(&rest, 2);
+    assert!(words.contains("--ends moving"), "{words}");
+    plan(&moving, &["--ends", "moving"]);
+    lay(&moving, 0);
+    let rows =
+        widths(folder.path(), ["bead_path_mm", "nozzle_path_mm", "width_mm", "speed_mm_per_s"]);
+    let at_corner = rows.iter().filter(|row| (380.0..420.0).contains(&row[1]));
+    let slowest = at_corner.map(|row| row[3]).fold(f64::INFINITY, f64::min);
+    assert!(slowest < 35.0, "{slowest}");
+}
+
+#[test]
 fn a_robot_waits_for_a_flow_that_is_known_to_be_late_and_the_bead_is_whole() {
     let without = ("starts = \"", "# starts = \"");
     let mut gap = [0.0; 2];

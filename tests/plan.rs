@@ -81,7 +81,12 @@ fn a_table_is_planned_within_the_limits_of_its_cell() {
     assert!(none.contains(", 0.00 s added"), "{none}");
     assert!(width_rms(&answer) < 0.5 * width_rms(&none), "{answer}{none}");
     let page = fs::read_to_string(out.join("report.html")).unwrap();
-    assert!(page.contains("width [mm]") && page.contains("command [rpm]"));
+    for part in
+        ["width [mm]", "width error [mm]", "command [rpm]", "The width is foretold to stray"]
+    {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(page.contains("More time (--budget-s)"), "a plan without time is no good one");
 }
 
 #[test]

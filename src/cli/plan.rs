@@ -6,7 +6,7 @@ mod job;
 use std::path::PathBuf;
 
 use anyhow::Result;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 
 use super::WrongArguments;
@@ -15,7 +15,7 @@ use job::Bead;
 
 use crate::offline::output;
 use crate::offline::planned::{PlannedBead, page, rms, to_csv};
-use crate::plan::{Foretold, PlanError, Task, Unplanned, attainable, solve};
+use crate::plan::{Foretold, PlanError, Task, Unplanned, attainable, gcode, solve};
 
 /// Plans the robot's speed and the extruder's command together, ahead of a job.
 ///
@@ -27,6 +27,7 @@ use crate::plan::{Foretold, PlanError, Task, Unplanned, attainable, solve};
 Examples:
   truebead plan jobs/corner.gcode --cell cells/extruder-feedforward.toml --out plan
   truebead plan jobs/corner.csv --cell cells/extruder-feedforward.toml --out plan --budget-s 0.3
+  truebead plan jobs/corner.gcode --cell cells/corner.toml --out plan --ends moving
 
 The job is a table (.csv) of path, position and nominal speed, or G-code (.gcode, .nc,
 .g); jobs/README.md has both. The cell's [extruder] needs a strategy with a model,
@@ -61,10 +62,32 @@ pub struct PlanArgs {
     /// [default: 0, which slows every corner to --apex-mm-per-s]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     corner_mm: Option<f64>,
+    /// How beads of G-code begin and end
+    /// [default: rest]
+    #[arg(long, value_name = "HOW")]
+    ends: Option<Ends>,
     /// Flow that no model tells: its standard deviation as a share of that of the flow's
     /// change; the more, the less the flow is changed
     #[arg(long, value_name = "SHARE", default_value_t = 0.17, allow_negative_numbers = true)]
     unmodelled_share: f64,
+}
+
+/// How beads begin and end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Ends {
+    /// At rest, robot and extruder
+    Rest,
+    /// At the feed; for a cell, which starts and stops its beads itself
+    Moving,
+}
+
+impl From<Ends> for gcode::Ends {
+    fn from(ends: Ends) -> Self {
+        match ends {
+            Ends::Rest => Self::Rest,
+            Ends::Moving => Self::Moving,
+        }
+    }
 }
 
 /// Runs the command; a summary goes to standard output.
@@ -73,17 +96,20 @@ pub fn run(args: &PlanArgs) -> Result<()> {
     let extruder = Extruder::read(args)?;
     let beads = job::read(args, &extruder)?;
     extruder.check_speeds(&beads, &args.job)?;
+    output::make_folder(&args.out)?;
     let task = extruder.task(args);
     let planned: Result<Vec<PlannedBead>, PlanError> =
         beads.into_par_iter().map(|bead| plan(&task, bead)).collect();
     let planned = planned.map_err(|error| job::wrong(&args.job, &error))?;
-    output::make_folder(&args.out)?;
     let summary = summary(&planned, &extruder);
     let table = to_csv(&planned, &extruder.facts)?;
     let table = output::write_whole(&args.out, "plan.csv", &table)?;
-    let page = page(&planned, &extruder.facts, &summary);
+    let warnings: Vec<String> = extruder.beyond(range(&planned, &extruder)).into_iter().collect();
+    let page = page(&planned, &extruder.facts, &summary, &warnings);
     let page = output::write_whole(&args.out, "report.html", page.as_bytes())?;
-    extruder.warn_beyond(range(&planned, &extruder));
+    for warning in &warnings {
+        tell!("warning: {warning}");
+    }
     for (name, value) in &summary {
         say!("{name:<10} {value}");
     }

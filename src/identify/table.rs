@@ -1,6 +1,8 @@
 //! Logged data as a table with named columns. Lines are counted as an editor
 //! counts them, the names being line 1.
 
+use crate::document::csv::in_words;
+
 /// What is wrong with a table.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TableError {
@@ -159,14 +161,7 @@ fn number(cell: &str) -> Option<f64> {
 }
 
 fn of_line(error: &csv::Error) -> TableError {
-    let line = error.position().map_or(1, csv::Position::line);
-    let what = match error.kind() {
-        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-            format!("{len} cells, expected {expected_len} as in the line of names")
-        }
-        csv::ErrorKind::Utf8 { .. } => "this is no text".to_owned(),
-        _ => error.to_string(),
-    };
+    let (line, what) = in_words(error);
     TableError::Line { line, what }
 }
 
@@ -210,7 +205,7 @@ mod tests {
         let said = |text: &str| Table::parse(text).unwrap_err().to_string();
         assert_eq!(said("\n\n"), "there is no line with the names of columns");
         assert_eq!(said("a,a\n1,2\n"), "two columns are called a");
-        assert_eq!(said("a,b\n1,2\n3\n"), "line 3: 1 cells, expected 2 as in the line of names");
+        assert_eq!(said("a,b\n1,2\n3\n"), "line 3: found 1 field, expected 2 as in the heading");
         let table = Table::parse("a,b\n1,2\n").unwrap();
         let error = table.column("c").unwrap_err().to_string();
         assert_eq!(error, "there is no column c; the columns are a, b");

@@ -2,6 +2,7 @@
 
 mod page;
 mod table;
+mod verdict;
 
 pub use page::page;
 pub use table::to_csv;

@@ -23,6 +23,16 @@ const CHORD_MM: f64 = 1.0;
 /// A turn whose cosine differs from 1 by less is none.
 const STRAIGHT: f64 = 1e-6;
 
+/// How beads begin and end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ends {
+    /// At rest.
+    Rest,
+    /// At the speed of their first and their last move, where something else starts and
+    /// stops them.
+    Moving,
+}
+
 /// What the path's speed limits are made with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
@@ -37,6 +47,8 @@ pub struct Settings {
     pub corner_mm: f64,
     /// Speed to which no corner is slowed further \[mm/s\].
     pub apex_mm_per_s: f64,
+    /// How beads begin and end.
+    pub ends: Ends,
 }
 
 /// A bead: what is laid from one rapid move, or the start, to the next.
@@ -44,8 +56,7 @@ pub struct Settings {
 pub struct Stretch {
     /// Line of its first move.
     pub line: usize,
-    /// How fast its path may be passed; the path begins at 0 mm, at rest, and ends at
-    /// rest.
+    /// How fast its path may be passed; the path begins at 0 mm.
     pub limits: PathLimits,
     /// Path and position \[mm\].
     pub position: Vec<(f64, [f64; 3])>,
@@ -84,14 +95,19 @@ pub fn read(text: &str, settings: &Settings) -> Result<Vec<Stretch>, GcodeError>
 /// The bead of some moves; `None` of none.
 fn stretch(moves: &[(usize, Move, f64)], settings: &Settings) -> Option<Stretch> {
     let (line, first, _) = moves.first()?;
-    let mut limits = PathLimits::new(0.0, 0.0);
+    // A node is no faster than the pieces beside it.
+    let end = match settings.ends {
+        Ends::Rest => 0.0,
+        Ends::Moving => settings.fastest_mm_per_s,
+    };
+    let mut limits = PathLimits::new(0.0, end);
     let mut position = vec![(0.0, first.at(0.0))];
     let after = moves.iter().skip(1).map(|(_, next, _)| Some(next)).chain([None]);
     for ((_, moved, feed), next) in moves.iter().zip(after) {
         let from = limits.end_mm();
         let sideways = (settings.accel_mm_per_s2 * moved.radius_mm()).sqrt();
         let speed = feed.min(settings.fastest_mm_per_s).min(sideways);
-        let there = next.map_or(0.0, |next| junction(moved, next, settings));
+        let there = next.map_or(end, |next| junction(moved, next, settings));
         limits.to(from + moved.length_mm(), speed, there);
         position
             .extend(chords(moved).map(|share| (from + share * moved.length_mm(), moved.at(share))));
@@ -141,6 +157,7 @@ mod tests {
         accel_mm_per_s2: 2000.0,
         corner_mm: 0.0,
         apex_mm_per_s: 2.0,
+        ends: Ends::Rest,
     };
 
     #[test]
@@ -194,6 +211,17 @@ mod tests {
         assert_eq!((all[0].line, all[1].line), (1, 4));
         assert!(all[0].nominal(2000.0).unwrap().speed_at(10.0) > 99.0);
         assert_eq!(all[1].position[0].1, [30.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_bead_that_something_else_starts_and_stops_begins_and_ends_at_its_feed() {
+        let text = "G1 X200 F6000\nY200\nY300 F3000\nG0 X0\nG1 X50\n";
+        let all = read(text, &Settings { ends: Ends::Moving, ..SETTINGS }).unwrap();
+        let speeds = |at: usize, path_mm: f64| all[at].nominal(2000.0).unwrap().speed_at(path_mm);
+        let found = [speeds(0, 0.0), speeds(0, 200.0), speeds(0, 500.0), speeds(1, 0.0)];
+        for (found, expected) in found.iter().zip([100.0, 2.0, 50.0, 50.0]) {
+            assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The planned profile of a job from a table: path length, position and nominal speed.
 
 use super::profile::{ProfileError, SpeedProfile};
+use crate::document::csv::in_words;
 
 /// Columns that are read; others are left alone.
 const PATH: &str = "path_mm";
@@ -27,7 +28,7 @@ pub enum JobError {
         column: &'static str,
     },
     /// A row that is not as long as the heading, or no text.
-    #[error("line {line}: {what}; give each row as many fields as the heading has")]
+    #[error("line {line}: {what}")]
     Row {
         /// Where.
         line: u64,
@@ -117,14 +118,7 @@ fn check_way(
 }
 
 fn of_row(error: &csv::Error) -> JobError {
-    let line = error.position().map_or(1, csv::Position::line);
-    let what = match error.kind() {
-        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-            format!("{len} fields where the heading has {expected_len}")
-        }
-        csv::ErrorKind::Utf8 { .. } => "this is no text".to_owned(),
-        _ => error.to_string(),
-    };
+    let (line, what) = in_words(error);
     JobError::Row { line, what }
 }
 

@@ -166,16 +166,16 @@ impl Extruder {
         Ok(())
     }
 
-    /// Tells where commands lie beyond what the model was identified with.
-    pub fn warn_beyond(&self, (low, high): (f64, f64)) {
-        let Some(Identified { source, range: (least, most) }) = &self.identified else { return };
-        if low < *least || high > *most {
-            tell!(
-                "warning: {source}: it was identified from {least} to {most} {unit}, and the plan \
-                 has commands from {low:.4} to {high:.4} {unit}; what it says there is a guess",
-                unit = self.facts.unit
-            );
-        }
+    /// What is to be said of commands beyond what the model was identified with, if they are.
+    pub fn beyond(&self, (low, high): (f64, f64)) -> Option<String> {
+        let Identified { source, range: (least, most) } = self.identified.as_ref()?;
+        let unit = self.facts.unit;
+        (low < *least || high > *most).then(|| {
+            format!(
+                "{source}: it was identified from {least} to {most} {unit}, and the plan has \
+                 commands from {low:.4} to {high:.4} {unit}; what it says there is a guess"
+            )
+        })
     }
 }
 

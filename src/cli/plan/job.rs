@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use super::PlanArgs;
 use super::cell::Extruder;
+use super::{Ends, PlanArgs};
 use crate::cli::WrongArguments;
 use crate::plan::{SpeedProfile, gcode, job};
 
@@ -40,9 +40,13 @@ pub fn read(args: &PlanArgs, extruder: &Extruder) -> Result<Vec<Bead>, WrongArgu
     if is_gcode {
         return of_gcode(args, extruder, &text);
     }
-    if args.corner_mm.is_some() {
-        let what = "--corner-mm is for G-code; a table tells its speed at every corner";
-        return Err(wrong(path, &what));
+    for (name, is_given) in
+        [("--corner-mm", args.corner_mm.is_some()), ("--ends", args.ends.is_some())]
+    {
+        if is_given {
+            let what = format!("{name} is for G-code; a table tells its speed at every place");
+            return Err(wrong(path, &what));
+        }
     }
     let job = job::read(&text).map_err(|error| wrong(path, &error))?;
     Ok(vec![Bead { name: "Along the bead".to_owned(), nominal: job.speed, position: job.position }])
@@ -55,6 +59,7 @@ fn of_gcode(args: &PlanArgs, extruder: &Extruder, text: &str) -> Result<Vec<Bead
         accel_mm_per_s2: extruder.accel_mm_per_s2,
         corner_mm: args.corner_mm.unwrap_or(0.0),
         apex_mm_per_s: args.apex_mm_per_s,
+        ends: args.ends.unwrap_or(Ends::Rest).into(),
     };
     let stretches = gcode::read(text, &settings).map_err(|error| wrong(&args.job, &error))?;
     let bead = |stretch: gcode::Stretch| {

@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 
+use super::verdict::verdict;
 use super::{Facts, PlannedBead, rms};
 use crate::offline::report::area::{Area, XAxis};
 use crate::offline::report::legend::legend;
@@ -19,8 +20,13 @@ const POINTS: u32 = 2000;
 /// A curve, its name, its colour and whether it is only wished for.
 type Curve = (Series, &'static str, Ink, bool);
 
-/// The page, with names and values under its title.
-pub fn page(beads: &[PlannedBead], facts: &Facts, about: &[(String, String)]) -> String {
+/// The page, with names and values under its title, and with warnings.
+pub fn page(
+    beads: &[PlannedBead],
+    facts: &Facts,
+    about: &[(String, String)],
+    warnings: &[String],
+) -> String {
     let mut drawn: Vec<&PlannedBead> = beads.iter().collect();
     if drawn.len() > DRAWN {
         let error = |bead: &PlannedBead| rms([bead], |bead| &bead.planned);
@@ -30,6 +36,7 @@ pub fn page(beads: &[PlannedBead], facts: &Facts, about: &[(String, String)]) ->
     let body = html! {
         h1 { "A job that is planned ahead" }
         div.about { @for (name, value) in about { span { (name) " " b { (value) } } } }
+        (verdict(beads, facts, warnings))
         @if drawn.len() < beads.len() {
             p.hint { "Of " (beads.len()) " beads the " (DRAWN) " with the largest errors are drawn." }
         }
@@ -55,13 +62,7 @@ fn section(bead: &PlannedBead, facts: &Facts) -> Markup {
     ];
     let command = at_time(&|t| bead.plan.command_at(t) + facts.idle);
     let commands = [(command, "command", palette::SCREW, false)];
-    let width = |of: &Foretold| {
-        let mut series = Series::default();
-        for (at, share) in &of.width {
-            series.push(*at, facts.width_mm * (1.0 + share));
-        }
-        series
-    };
+    let width = |of: &Foretold| widths_about(facts.width_mm, of, facts);
     let widths = [
         (
             width(&bead.proportional),
@@ -72,6 +73,7 @@ fn section(bead: &PlannedBead, facts: &Facts) -> Markup {
         (width(&bead.constant), "not planned, constant command", palette::PAPER, false),
         (width(&bead.planned), "planned", palette::OURS, false),
     ];
+    let planned = [(widths_about(0.0, &bead.planned, facts), "planned", palette::OURS, false)];
     html! {
         section {
             h2 { (bead.name) }
@@ -79,11 +81,21 @@ fn section(bead: &PlannedBead, facts: &Facts) -> Markup {
                 tells comes on top. Dips of the speed a nozzle's length apart count on that length; \
                 a larger --nozzle-doubt has fewer of them." }
             (plot("width [mm]", &path, &widths, Some(facts.width_mm)))
+            (plot("width error [mm]", &path, &planned, Some(0.0)))
             (plot("speed [mm/s]", &path, &speeds, None))
             (plot("flow [mm³/s]", &path, &flows, None))
             (plot(&format!("command [{}]", facts.unit), &path, &commands, None))
         }
     }
+}
+
+/// The width over path as it strays about a value \[mm\].
+fn widths_about(middle_mm: f64, of: &Foretold, facts: &Facts) -> Series {
+    let mut series = Series::default();
+    for (at, share) in &of.width {
+        series.push(*at, middle_mm + facts.width_mm * share);
+    }
+    series
 }
 
 /// A value along the path of a speed.

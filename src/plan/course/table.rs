@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::{PlannedCourse, PlannedJob, Row};
+use crate::document::csv::in_words;
 use crate::identify::quantity::Unit;
 
 /// How the column of the command begins; its end is the unit.
@@ -26,8 +27,10 @@ pub enum TableError {
         found: String,
     },
     /// A row that is not as long as the heading, or no text.
-    #[error("{what}")]
+    #[error("line {line}: {what}; was the file cut short? Plan the job again")]
     Row {
+        /// Where.
+        line: u64,
         /// What is wrong with it.
         what: String,
     },
@@ -108,7 +111,10 @@ impl Columns {
 /// Reads a plan.
 pub fn read(text: &str) -> Result<PlannedJob, TableError> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
-    let of_row = |error: csv::Error| TableError::Row { what: error.to_string() };
+    let of_row = |error: csv::Error| {
+        let (line, what) = in_words(&error);
+        TableError::Row { line, what }
+    };
     let (columns, unit) = Columns::of(reader.headers().map_err(of_row)?)?;
     let mut beads: Vec<(String, Vec<Row>)> = Vec::new();
     for record in reader.records() {
@@ -138,6 +144,10 @@ fn wrong(line: u64, column: &str, found: f64, expected: &'static str) -> TableEr
     TableError::Number { line, column: column.to_owned(), found: found.to_string(), expected }
 }
 
+/// What a bead in a cell begins with.
+const EXPECTED: &str = "a bead that begins at a speed above 0, for the cell starts it itself: plan \
+                        G-code with --ends moving";
+
 fn begins(row: &Row, line: u64) -> Result<(), TableError> {
     for (column, found) in [("time_s", row.time_s), ("path_mm", row.path_mm)] {
         if found > 0.0 {
@@ -145,7 +155,7 @@ fn begins(row: &Row, line: u64) -> Result<(), TableError> {
         }
     }
     if row.speed_mm_per_s <= 0.0 {
-        return Err(wrong(line, "speed_mm_per_s", 0.0, "a bead that begins at a speed above 0"));
+        return Err(wrong(line, "speed_mm_per_s", 0.0, EXPECTED));
     }
     Ok(())
 }

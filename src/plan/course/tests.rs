@@ -75,6 +75,9 @@ fn what_is_no_plan_is_refused_with_its_line() {
     assert!(words.contains("line 7") && words.contains("\"far\""), "{words}");
     let words = refused("1,0.05,5.000000", "1,0.05,1.000000");
     assert!(words.contains("line 7") && words.contains("path_mm"), "{words}");
+    let short = text().len() - 40;
+    let words = PlannedJob::parse(&text()[..short]).unwrap_err().to_string();
+    assert!(words.contains("cut short"), "{words}");
     let words = refused("1,0.05,", "1,0.03,");
     assert!(words.contains("time_s"), "{words}");
     let words = refused("1,0.00,0.000000", "1,0.00,3.000000");
