@@ -38,9 +38,10 @@ in any run. With --simulated nothing is moved: the cell's own simulated bead is 
 
 With --recording nothing is run; any run tells in which the speed changed clearly.
 
-Leaves tune.json, report.html and, of an experiment, recording.mcap. Nothing is
-applied: the cell file stays as it is, and --write makes a copy with the proposed
-settings.
+Leaves tune.json, report.html and, of an experiment, recording.mcap; of one on the real
+cell also run/, with the report of that run. Nothing is applied: the cell file stays as it
+is, and --write makes a copy with the proposed settings, beside the cell where that names
+other files.
 
 Exit status: 0 found, 1 not to be told from this bead, 2 wrong arguments or
 configuration, 3 the run lost records or refused too many frames.")]
@@ -102,6 +103,9 @@ pub fn run(args: &TuneArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     if !recording.exists() {
         let what = format!("{}: there is no such recording", recording.display());
         return Err(WrongArguments::new(what).into());
+    }
+    if !voice.quiet {
+        tell!("looking at {}: this takes some seconds", recording.display());
     }
     let tuned = analyse::tuned(&recording, &loaded, args.max_mm.unwrap_or(FARTHEST))?;
     output::make_folder(&args.out)?;

@@ -3,6 +3,9 @@
 use crate::time::{Span, Stamp};
 use crate::units::MmPerS;
 
+/// Time that the speed of a robot takes to follow, unless its own is known: one over the
+/// angular frequency of a loop of 10 Hz, as the 2022 paper has it.
+pub const ROBOT_LAG: Span = Span::from_millis(16);
 /// Share of the setpoint by which the speed may differ.
 const TOLERANCE: f64 = 0.10;
 /// Share from which the robot counts as held by limits of its own.

@@ -3,12 +3,9 @@
 
 use super::{Controller, Phase, Steering};
 use crate::control::distance::Distrust;
-use crate::time::{Span, Stamp};
+use crate::control::follow::ROBOT_LAG;
+use crate::time::Stamp;
 use crate::units::{Mm, MmPerS};
-
-/// Time that a robot's speed takes to follow: one over the angular frequency
-/// of a loop of 10 Hz, as the 2022 paper has it.
-pub(super) const ROBOT_LAG: Span = Span::from_millis(16);
 
 impl Controller {
     /// Begins to track as soon as the first stretch is over and the law knows

@@ -1,7 +1,7 @@
 //! A job that robot and extruder were planned for together, bead by bead.
 
-use super::by_distance::ROBOT_LAG;
 use super::{Controller, ExtruderSide};
+use crate::control::follow::ROBOT_LAG;
 use crate::plan::{Planned, PlannedCourse};
 use crate::time::Stamp;
 use crate::units::Mm;

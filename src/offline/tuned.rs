@@ -100,13 +100,7 @@ impl Tuned {
     /// What somebody should know before anything of this is used.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
-        if let Some(width) = self.log.steps.and_then(|steps| steps.near_end_mm) {
-            warnings.push(format!(
-                "the steps ended early: a width of {:.2} mm came near an end of \
-                 gauge.width_range_mm; fewer pieces tell less",
-                width.get()
-            ));
-        }
+        warnings.extend(self.log.cut_short().map(|why| format!("{why}; fewer pieces tell less")));
         warnings.extend(self.gains_warning());
         warnings.extend(self.offset_warning());
         if let Err(error) = &self.plant.robot {

@@ -2,7 +2,7 @@
 //! came.
 
 use crate::control::offset::Width;
-use crate::control::steps::StepsTrace;
+use crate::control::steps::{Progress, StepSettings, StepsTrace};
 use crate::control::{Command, Event, RobotState, Step};
 use crate::time::Stamp;
 use crate::units::MmPerS;
@@ -44,6 +44,28 @@ impl Log {
             self.setpoints.push((now, speed));
         }
         self.steps = step.trace.steps.or(self.steps);
+    }
+
+    /// Why a course of steps was not seen to its end, if it was not; none where there was
+    /// none.
+    pub fn cut_short(&self) -> Option<String> {
+        let steps = self.steps?;
+        if let Some(width) = steps.near_end_mm {
+            return Some(format!(
+                "the steps ended early: a width of {:.2} mm came near an end of \
+                 gauge.width_range_mm",
+                width.get()
+            ));
+        }
+        match steps.progress {
+            Progress::Piece(number) => {
+                Some(format!("the run ended in piece {} of {}", number + 1, StepSettings::count()))
+            }
+            Progress::Seeing => {
+                Some("the run ended before the camera had seen the last piece".to_owned())
+            }
+            Progress::Over => None,
+        }
     }
 
     /// Puts widths into the order of their frames, whatever came in between.

@@ -6,14 +6,12 @@ use super::noise::{Drift, Scatter, scatter};
 use super::robot::{RobotAnswer, RobotError, answer};
 use super::timing::{Timing, timing};
 use super::{Known, Log, TuneError};
+use crate::control::follow::ROBOT_LAG;
 use crate::control::offset::{Search, Study, study};
 use crate::units::{Mm, MmPerS};
 
 /// Part of the exponent as which its standard deviation says nothing any more.
 const LOOSE: f64 = 1.0 / 3.0;
-/// Taken for a robot whose answer was not told: that of a loop of 10 Hz, as the 2022
-/// paper has it \[s\].
-const USUAL_LAG_S: f64 = 0.016;
 
 /// What has to be known beforehand.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,7 +98,8 @@ impl Plant {
 
     /// The robot's answer; that of a usual robot where it was not told.
     pub fn answers(&self) -> Answers {
-        self.robot.map_or(Answers { dead_s: 0.0, lag_s: USUAL_LAG_S }, |robot| Answers {
+        let usual = Answers { dead_s: 0.0, lag_s: ROBOT_LAG.secs() };
+        self.robot.map_or(usual, |robot| Answers {
             dead_s: robot.dead_time_s.value,
             lag_s: robot.lag_s.value,
         })

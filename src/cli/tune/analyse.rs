@@ -44,6 +44,12 @@ pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<T
     let run = loaded.cell.run.as_ref().context("the cell was not read for a run")?;
     let facts = Facts { gauge, farthest, start_speed: run.robot.start_speed };
     let plant = Plant::of(&log, &facts).with_context(|| {
+        if log.states.is_empty() {
+            return format!("{name}: no robot was heard, and no bead was laid");
+        }
+        if let Some(why) = log.cut_short() {
+            return format!("{name} does not tell what the cell is like: {why}");
+        }
         let extruder = if run.extruder.is_some() {
             " (the cell commands its extruder: where the flow follows the speed, the width does \
              not; tune with an even flow)"

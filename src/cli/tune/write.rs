@@ -15,12 +15,14 @@ use crate::io::whole_file::write_whole;
 use crate::offline::tuned::Tuned;
 
 /// Keys of the file that name another file.
-const PATHS: [(&str, &str); 5] = [
+const PATHS: [(&str, &str); 7] = [
     ("calibration", "file"),
     ("camera", "source"),
     ("extruder", "model"),
     ("extruder", "library"),
     ("extruder", "profile"),
+    ("extruder", "starts"),
+    ("extruder", "plan"),
 ];
 
 /// Refuses a name that is taken, and another folder where paths of the cell would lead

@@ -27,7 +27,8 @@ impl DistanceCharts {
             return;
         };
         let (path, level, sigma) = (path.get(), trace.level_mm.get(), trace.level_sigma_mm.get());
-        if level <= 0.0 {
+        // Before the first width nothing is known.
+        if sigma >= level {
             return;
         }
         self.level.push(path, level);

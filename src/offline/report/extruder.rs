@@ -18,7 +18,7 @@ use crate::time::Stamp;
 use crate::units::Mm3PerS;
 
 /// The states of the extruder side.
-const STATES: [&str; 5] = ["off", "starting", "running", "holding", "fault"];
+const STATES: [&str; 6] = ["off", "starting", "running", "ending", "holding", "fault"];
 
 /// What the plots of the extruder side are drawn from.
 #[derive(Debug, Default)]

@@ -57,6 +57,8 @@ pub const IDLE: Ink = ink("idle", [190, 196, 206], [140, 148, 160]);
 pub const PRIMING: Ink = ink("priming", [86, 180, 233], [86, 180, 233]);
 /// The width is being corrected.
 pub const TRACKING: Ink = ink("tracking", [0, 158, 115], [0, 158, 115]);
+/// A pump was stopped early, and what still comes fills the bead.
+pub const ENDING: Ink = ink("ending", [148, 190, 84], [148, 190, 84]);
 /// The speed is kept.
 pub const HOLDING: Ink = ink("holding", [230, 159, 0], [230, 159, 0]);
 /// The controller gave up.
@@ -71,9 +73,9 @@ pub const GAUGE: Ink = ink("gauge", [0, 158, 115], [0, 158, 115]);
 /// Controllers beside each other, in order.
 pub const CONTENDERS: [Ink; 6] = [PAPER, OURS, TRACKING, SETPOINT, LIMIT, FILLED];
 
-const ALL: [Ink; 22] = [
+const ALL: [Ink; 23] = [
     WIDTH, TARGET, SPEED, SETPOINT, DEMAND, LIMIT, REJECTED, FLOW, PRESSURE, SCREW, FILLED, MODEL,
-    PAPER, OURS, IDLE, PRIMING, TRACKING, HOLDING, FAULT, LEFT_EDGE, RIGHT_EDGE, GAUGE,
+    PAPER, OURS, IDLE, PRIMING, TRACKING, ENDING, HOLDING, FAULT, LEFT_EDGE, RIGHT_EDGE, GAUGE,
 ];
 
 impl Ink {
@@ -92,7 +94,7 @@ pub fn state(name: &str) -> Option<Ink> {
         "running" => "tracking",
         same => same,
     };
-    [IDLE, PRIMING, TRACKING, HOLDING, FAULT].into_iter().find(|ink| ink.name == name)
+    [IDLE, PRIMING, TRACKING, ENDING, HOLDING, FAULT].into_iter().find(|ink| ink.name == name)
 }
 
 /// The style sheet's variables, for light and dark pages.

@@ -2,15 +2,13 @@
 
 use crate::cli::WrongArguments;
 use crate::config::cell::{ExtruderPart, RunPart};
+use crate::control::follow::ROBOT_LAG;
 use crate::extruder::start_stop::{Laid, Timing};
 use crate::identify::start_stop::file;
 use crate::io::record::ExtruderFile;
 use crate::plan::PlannedJob;
 use crate::time::Span;
 use crate::units::Mm;
-
-/// Time that a robot's speed takes to follow, beside half the time of a setpoint.
-const ROBOT_LAG_S: f64 = 0.016;
 
 /// Reads the file of starts and stops for the bead of the cell.
 pub fn timing(run: &RunPart, part: &ExtruderPart, found: &ExtruderFile) -> anyhow::Result<Timing> {
@@ -21,7 +19,7 @@ pub fn timing(run: &RunPart, part: &ExtruderPart, found: &ExtruderFile) -> anyho
         speed,
         // A robot that is told to lay bead cannot be told to stand.
         least_share: run.limits.min_speed / speed,
-        robot_lag: Span::from_secs(0.5 / run.robot.rate_hz + ROBOT_LAG_S),
+        robot_lag: Span::from_secs(0.5 / run.robot.rate_hz) + ROBOT_LAG,
     };
     Timing::new(read.parameters, laid)
         .map_err(|error| WrongArguments::new(format!("{}: {error}", found.source)).into())
