@@ -14,6 +14,7 @@ use super::WrongArguments;
 use crate::calib::{Calibration, SurfaceMap};
 use crate::config::Cell;
 use crate::config::cell::{CalibrationSource, ExtruderPart, Purpose};
+use crate::config::control::WidthLaw;
 use crate::extruder::ExtruderSetup;
 use crate::io::calibration_file;
 use crate::io::record::ExtruderFile;
@@ -77,7 +78,26 @@ impl LoadedCell {
                 (calibration, Some(text))
             }
         };
-        Ok(Self { path: path.to_owned(), text, cell, calibration, calibration_text })
+        let loaded = Self { path: path.to_owned(), text, cell, calibration, calibration_text };
+        loaded.check_sight()?;
+        Ok(loaded)
+    }
+
+    /// Refuses a law by distance whose camera looks at bead that is not laid yet.
+    fn check_sight(&self) -> Result<(), WrongArguments> {
+        let Some(run) = &self.cell.run else { return Ok(()) };
+        let half = self.cell.gauge_length(&self.calibration) * 0.5;
+        let offset = run.camera.offset;
+        if offset >= half || !matches!(run.control.law, WidthLaw::Distance(_)) {
+            return Ok(());
+        }
+        Err(WrongArguments::new(format!(
+            "{}: camera.offset_mm: found {}, expected {:.1} or more with law = \"distance\": that \
+             is half the length of bead within the gauge, and what is seen must have been laid",
+            self.path.display(),
+            offset.get(),
+            half.get()
+        )))
     }
 
     /// The extruder side as the controller has it; none where the cell has

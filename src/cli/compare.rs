@@ -29,7 +29,9 @@ disturbs it and the measurement's noise are those of the first cell, [bead] and
 reports is each cell's own.
 
 Leaves compare.json and report.html, and prints the table. Errors are those of the bead
-itself; ± is 95 % confidence of the mean over seeds.
+itself, from 30 mm after control began, where simulate tells those that were measured; ±
+is 95 % confidence of the mean over seeds, and where a bead settled is the median. A bead
+of level \"frames\" renders every frame and takes minutes.
 
 Exit status: 0 compared, 2 a cell that cannot be simulated or wrong arguments.")]
 pub struct CompareArgs {
@@ -43,7 +45,8 @@ pub struct CompareArgs {
     #[arg(long, value_name = "N", default_value_t = 100,
           value_parser = clap::value_parser!(u64).range(1..=100_000))]
     seeds: u64,
-    /// Widths that are asked for [mm]; the first cell's own where none is given
+    /// Widths that are asked for in place of the cells' own [mm]
+    /// [default: the first cell's, where it asks for one]
     #[arg(long, value_name = "W,W…", value_delimiter = ',')]
     widths: Vec<f64>,
 }
@@ -126,14 +129,34 @@ fn name(path: &std::path::Path, others: &[Contender]) -> String {
 
 fn widths(args: &CompareArgs, contenders: &[Contender]) -> anyhow::Result<Vec<Mm>> {
     if args.widths.is_empty() {
+        let changes = contenders.iter().find(|who| !who.run.control.target.is_constant());
+        if let Some(who) = changes {
+            let what = format!(
+                "{}: found a target that changes along the path or by layer, expected one width: \
+                 name widths to compare with --widths",
+                who.name
+            );
+            return Err(WrongArguments::new(what).into());
+        }
         let own = contenders.first().map(|who| who.run.control.target.nominal());
         return Ok(own.into_iter().collect());
     }
     let sound = |width: &f64| Mm::new(*width).ok().filter(|_| (0.1..=1000.0).contains(width));
     let widths: Option<Vec<Mm>> = args.widths.iter().map(sound).collect();
-    widths.ok_or_else(|| {
+    let widths = widths.ok_or_else(|| {
         let found: Vec<String> = args.widths.iter().map(f64::to_string).collect();
         let what = format!("--widths: found {}, expected 0.1 to 1000 mm each", found.join(","));
-        WrongArguments::new(what).into()
-    })
+        WrongArguments::new(what)
+    })?;
+    for who in contenders {
+        let (low, high) = who.cell.gauge.width_range;
+        if let Some(width) = widths.iter().find(|width| **width < low || **width > high) {
+            let what = format!(
+                "--widths: found {width}, expected {low} to {high}, which is the width_range_mm of {}",
+                who.name
+            );
+            return Err(WrongArguments::new(what).into());
+        }
+    }
+    Ok(widths)
 }

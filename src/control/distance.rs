@@ -104,6 +104,8 @@ pub enum Distrust {
     NoPath,
     /// The width does not answer the speed as the model says.
     ModelContradicted,
+    /// The bead that is seen is none whose speed is known.
+    Unpaired,
 }
 
 /// The law with what it has seen.
@@ -118,6 +120,11 @@ pub struct ByDistance {
     unrest: Unrest,
     colour: Colour,
     trust: Trust,
+    /// The nozzle's path when the first of the last widths came that show bead of which no
+    /// speed is known \[mm\].
+    unpaired: Option<f64>,
+    /// Whether there were too many of them on this bead.
+    is_unpaired: bool,
 }
 
 impl ByDistance {
@@ -126,7 +133,7 @@ impl ByDistance {
         let exponent = settings.exponent;
         Self {
             settings,
-            trail: Trail::new(settings.reference_speed.get()),
+            trail: Trail::new(settings.reference_speed.get(), reach_mm(&settings)),
             level: Level::new(exponent, settings.learns_exponent),
             changes: Changes::new(settings.gauge.get()),
             pulsation: Pulsation::new(),
@@ -136,6 +143,8 @@ impl ByDistance {
             unrest: Unrest::default(),
             colour: Colour::new(settings.gauge.get()),
             trust: Trust::default(),
+            unpaired: None,
+            is_unpaired: false,
         }
     }
 
@@ -148,6 +157,7 @@ impl ByDistance {
         self.offset.begin_bead();
         self.colour.begin_anew();
         self.trust = Trust::default();
+        (self.unpaired, self.is_unpaired) = (None, false);
     }
 
     /// What the robot reported: where the nozzle is, and how fast it moves. The
@@ -164,6 +174,7 @@ impl ByDistance {
         (width, sigma): (Mm, Mm),
         wanted: Mm,
     ) -> DistanceTrace {
+        self.watch_the_trail(nozzle_path.get());
         let taken = match self.pair(nozzle_path.get(), width.get(), sigma.get()) {
             Some(pairing) => self.take(&pairing, nozzle_path.get(), wanted.get()),
             None => Use::NotPaired,
@@ -183,6 +194,9 @@ impl ByDistance {
 
     /// Why the law is not to be trusted any more, if so.
     pub fn distrust(&self) -> Option<Distrust> {
+        if self.is_unpaired {
+            return Some(Distrust::Unpaired);
+        }
         self.trust.is_lost().then_some(Distrust::ModelContradicted)
     }
 
@@ -198,12 +212,30 @@ impl ByDistance {
         MmPerS::new(speed).ok()
     }
 
+    /// Notices when no speed is known of the bead that is seen for longer than a bead's
+    /// beginning takes to come under the camera.
+    fn watch_the_trail(&mut self, nozzle_path: f64) {
+        let (place, half) = (self.place(nozzle_path), 0.5 * self.settings.gauge.get());
+        if self.trail.over(place - half, place + half).is_some() {
+            self.unpaired = None;
+            return;
+        }
+        let since = *self.unpaired.get_or_insert(nozzle_path);
+        let longest = (self.settings.offset + self.settings.gauge).get() + LOST_MM;
+        self.is_unpaired |= nozzle_path - since > longest;
+    }
+
+    /// Middle of the gauge along the path \[mm\].
+    fn place(&self, nozzle_path: f64) -> f64 {
+        nozzle_path - self.settings.offset.get() * self.offset.factor()
+    }
+
     fn pair(&self, nozzle_path: f64, width: f64, sigma: f64) -> Option<Pairing> {
         if width <= 0.0 || self.trail.stands() {
             return None;
         }
         let offset = self.settings.offset.get();
-        let place = nozzle_path - offset * self.offset.factor();
+        let place = self.place(nozzle_path);
         let doubt = DOUBTS * self.offset.sigma() * offset;
         let exponent = self.level.exponent();
         let gauge = self.settings.gauge.get();
@@ -258,7 +290,7 @@ impl ByDistance {
             let learns = self.unrest.is_calm() || self.level.hardly_knows_exponent();
             self.level.update(&sight, learns && !pairing.is_doubtful());
         }
-        let Some(found) = self.changes.find().filter(|_| before.is_known()) else {
+        let Some(found) = self.changes.find() else {
             return if outlier { Use::Outlier } else { Use::Taken };
         };
         self.trust.begin_anew();
@@ -286,6 +318,17 @@ impl ByDistance {
     }
 }
 
+/// Bead behind the nozzle of which the law has to know the speed \[mm\]: to where the camera
+/// looks, and what it may look further.
+fn reach_mm(settings: &DistanceSettings) -> f64 {
+    FURTHER * (settings.offset + settings.gauge).get() + LOST_MM
+}
+
+/// Times the way to the end of the gauge for which speeds are kept.
+const FURTHER: f64 = 2.0;
+/// Way over which widths without a speed are nothing to worry about, beside that to the
+/// camera \[mm\].
+const LOST_MM: f64 = 50.0;
 /// Largest logarithm of a speed over the reference speed; beyond it limits act.
 const MOST_LN: f64 = 5.0;
 /// Standard deviations of the offset by which a pairing may be wrong.

@@ -23,8 +23,11 @@ impl Odometer {
     /// The report as it should be: with a path that goes on with the speed
     /// where the robot's stands although it moves.
     pub fn correct(&mut self, now: Stamp, state: &RobotState) -> RobotState {
-        if !state.mode.lays_bead() {
+        let falls = self.last.is_some_and(|(_, last)| state.path_mm < last.path_mm);
+        if falls || !state.mode.lays_bead() {
             *self = Self::default();
+        }
+        if !state.mode.lays_bead() {
             return *state;
         }
         if let Some((at, last)) = self.last {
@@ -35,7 +38,8 @@ impl Odometer {
                 self.unseen = Mm::ZERO;
             }
             if self.blind {
-                self.added = self.added + way.max(Mm::ZERO);
+                // A path that begins to grow late grows beside the speed's.
+                self.added = self.added + way - (state.path_mm - last.path_mm);
             } else if self.unseen > BELIEVED {
                 self.blind = true;
                 self.added = self.unseen;
@@ -89,6 +93,11 @@ mod tests {
         }
         assert!(odometer.is_blind());
         assert!((path - (7.0 + 490.0)).abs() < 1e-6, "{path}");
+        // One that begins to count late, or anew, counts once.
+        let late = odometer.correct(Stamp::from_secs(5.0), &report(17.0, RobotMode::Print));
+        assert!((late.path_mm.get() - (path + 10.0)).abs() < 1e-6, "{late:?}");
+        let anew = odometer.correct(Stamp::from_secs(5.1), &report(1.0, RobotMode::Print));
+        assert_eq!(anew.path_mm.get(), 1.0);
         let idle = odometer.correct(Stamp::from_secs(6.0), &report(7.0, RobotMode::Idle));
         assert_eq!(idle.path_mm.get(), 7.0);
         assert!(!odometer.is_blind());

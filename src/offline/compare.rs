@@ -12,7 +12,7 @@ use super::report::sections::legend;
 use super::report::series::Series;
 use super::report::whole_page;
 use super::reproduce::series;
-use crate::sim::compare::{Estimate, Figures};
+use crate::sim::compare::{Estimate, Figures, JUDGED_AFTER_MM, SCATTER_AFTER_MM};
 
 /// One number of one controller at one width, as `compare.json` has it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -53,6 +53,9 @@ const QUANTITIES: [(&str, &str, Told); 6] = [
     ("integral of the error's size", "mm²", Told::Mean),
     ("scatter once settled", "mm", Told::Mean),
 ];
+
+/// What is told of controllers that failed.
+const FAILED: &str = "seeds never controlled, or stopped";
 
 /// How a number over seeds is told in a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,6 +102,17 @@ impl Comparison {
         let mut numbers = Vec::new();
         for (width_mm, all) in &self.widths {
             for (controller, figures) in self.controllers.iter().zip(all) {
+                #[expect(clippy::cast_precision_loss, reason = "seeds are few")]
+                let failed = Some(figures.failed as f64);
+                numbers.push(Number {
+                    controller: controller.clone(),
+                    width_mm: *width_mm,
+                    quantity: FAILED,
+                    unit: "1",
+                    mean: failed,
+                    confidence_95: None,
+                    median: failed,
+                });
                 for ((quantity, unit, _), estimate) in QUANTITIES.iter().zip(estimates(figures)) {
                     numbers.push(Number {
                         controller: controller.clone(),
@@ -128,16 +142,29 @@ impl Comparison {
         for (at, (quantity, unit, how)) in QUANTITIES.iter().enumerate() {
             let unit = if *unit == "1" { String::new() } else { format!(" [{unit}]") };
             let _ = write!(text, "\n{quantity}{unit}\n");
-            for (who, name) in self.controllers.iter().enumerate() {
-                let _ = write!(text, "{name:widest$}");
-                for (_, all) in &self.widths {
-                    let cell = all.get(who).map(|found| told(&estimates(found)[at], *how));
-                    let _ = write!(text, "  {:>16}", cell.unwrap_or_default());
-                }
-                text.push('\n');
-            }
+            self.lines(&mut text, widest, |found| told(&estimates(found)[at], *how));
+        }
+        if self.has_failures() {
+            let _ = writeln!(text, "\n{FAILED}");
+            self.lines(&mut text, widest, |found| found.failed.to_string());
         }
         text
+    }
+
+    /// A line for each controller with a word for each width.
+    fn lines(&self, text: &mut String, widest: usize, word: impl Fn(&Figures) -> String) {
+        for (who, name) in self.controllers.iter().enumerate() {
+            let _ = write!(text, "{name:widest$}");
+            for (_, all) in &self.widths {
+                let word = all.get(who).map(&word).unwrap_or_default();
+                let _ = write!(text, "  {word:>16}");
+            }
+            text.push('\n');
+        }
+    }
+
+    fn has_failures(&self) -> bool {
+        self.widths.iter().flat_map(|(_, all)| all).any(|found| found.failed > 0)
     }
 
     /// The page.
@@ -145,8 +172,9 @@ impl Comparison {
         let body = html! {
             h1 { "Controllers beside each other" }
             p.hint { "The same bead and the same disturbances for all, " (self.seeds) " seeds each. \
-                Errors are those of the bead itself, from 30 mm after control began; ± is 95 % \
-                confidence of the mean over seeds." }
+                Errors are those of the bead itself, from " (JUDGED_AFTER_MM) " mm after control \
+                began, scatter from " (SCATTER_AFTER_MM) " mm after; ± is 95 % confidence of the mean \
+                over seeds. Where it settled is the median." }
             section {
                 h2 { "Numbers" }
                 div.wide { (self.table()) }
@@ -183,6 +211,15 @@ impl Comparison {
                         } }
                     } }
                 } }
+                @if self.has_failures() {
+                    tbody { @for (who, name) in self.controllers.iter().enumerate() { tr {
+                        td { @if who == 0 { (FAILED) } }
+                        td { (name) }
+                        @for (_, all) in &self.widths { td.number {
+                            @if let Some(found) = all.get(who) { (found.failed) }
+                        } }
+                    } } }
+                }
             }
         }
     }

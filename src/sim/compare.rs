@@ -1,6 +1,7 @@
 //! Several controllers on the same plant with the same seeds.
 
 use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::cell::SimError;
 use super::score::{AlongBead, mean, median};
@@ -16,8 +17,8 @@ pub const JUDGED_AFTER_MM: f64 = 30.0;
 pub const SCATTER_AFTER_MM: f64 = 700.0;
 /// Length of a piece of the bead over which errors are put together \[mm\].
 const PIECE_MM: f64 = 5.0;
-/// Standard deviations of a mean on either side that 95 of 100 lie within.
-const OF_95: f64 = 1.96;
+/// Share of means that a confidence interval holds.
+const CONFIDENCE: f64 = 0.95;
 
 /// A controller with its cell; bead, simulated world and calibration are those
 /// of the plant that all have.
@@ -45,9 +46,9 @@ impl Contender {
 /// A number over seeds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Its mean; none where it is infinite for a seed.
+    /// Its mean; none where a seed has none.
     pub mean: Option<f64>,
-    /// Half the interval that holds the mean with 95 % confidence.
+    /// Half the interval that holds the mean with 95 % confidence, by Student's t.
     pub confidence: Option<f64>,
     /// Its median; none where most seeds have none.
     pub median: Option<f64>,
@@ -65,10 +66,16 @@ impl Estimate {
         let median = median(&mut values);
         Self {
             mean: finite.then_some(middle),
-            confidence: (finite && count > 1.0).then_some(OF_95 * spread),
+            confidence: interval(count).filter(|_| finite).map(|times| times * spread),
             median: median.is_finite().then_some(median),
         }
     }
+}
+
+/// Half the confidence interval of a mean of so many values, in its standard deviations.
+fn interval(count: f64) -> Option<f64> {
+    let student = StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
+    Some(student.inverse_cdf(0.5 * (1.0 + CONFIDENCE)))
 }
 
 /// What a controller came to at one width.
@@ -87,6 +94,8 @@ pub struct Figures {
     /// Root mean square error over that of the first controller with the same
     /// seed.
     pub ratio: Estimate,
+    /// Seeds whose bead it never controlled, or did not lay to its end.
+    pub failed: usize,
     /// Root mean square error over all seeds, along the path.
     pub course: Vec<AlongBead>,
     /// Width of the bead of the first seed.
@@ -118,6 +127,7 @@ impl Figures {
             settled_mm: Estimate::of(of(&|trial| trial.settles_within(trial.begun_mm, 0.5))),
             scatter_mm: Estimate::of(of(&|trial| trial.scatter(trial.begun_mm + SCATTER_AFTER_MM))),
             ratio: Estimate::of(ratios),
+            failed: trials.iter().filter(|one| !one.whole || one.begun_mm.is_infinite()).count(),
             course: course(&trials, width.get()),
             example: trials.into_iter().next().map(|trial| trial.bead).unwrap_or_default(),
             rms_by_seed,
@@ -164,11 +174,29 @@ mod tests {
     fn an_estimate_tells_mean_median_and_confidence() {
         let estimate = Estimate::of(vec![1.0, 2.0, 3.0, 6.0]);
         assert_eq!((estimate.mean, estimate.median), (Some(3.0), Some(2.5)));
-        // s² = 14/3, s/√4 = 1.0801.
-        assert!((estimate.confidence.unwrap() - 1.96 * (14.0_f64 / 3.0).sqrt() / 2.0).abs() < 1e-9);
+        // s² = 14/3, s/√4 = 1.0801; Student's t of 3 degrees of freedom is 3.1824.
+        assert!((estimate.confidence.unwrap() - 3.1824 * 1.0801).abs() < 1e-3);
+        assert!((interval(100.0).unwrap() - 1.9842).abs() < 1e-3);
+        assert_eq!(Estimate::of(vec![2.0]).confidence, None);
         let never = Estimate::of(vec![1.0, f64::INFINITY, 2.0]);
         assert_eq!((never.mean, never.median), (None, Some(2.0)));
         assert_eq!(Estimate::of(vec![f64::INFINITY; 3]).median, None);
+    }
+
+    #[test]
+    fn a_controller_that_never_controls_or_stops_has_no_figures_to_boast_of() {
+        let ours = contender("ours", include_str!("../../cells/distance.toml"));
+        let width = Mm::constant(42.0);
+        let mut late = ours.clone();
+        late.run.robot.start_length = Mm::constant(1e5);
+        let late = Figures::lay(&late, width, 2, None).unwrap();
+        assert_eq!((late.failed, late.rms_error_mm.mean, late.settled_mm.median), (2, None, None));
+        assert_eq!((late.integral_mm2.mean, late.scatter_mm.mean), (None, None));
+        let mut blind = ours;
+        blind.cell.simulation.path = Mm::constant(500.0);
+        let blind = Figures::lay(&blind, width, 2, None).unwrap();
+        assert_eq!((blind.failed, blind.scatter_mm.mean), (0, None));
+        assert!(blind.rms_error_mm.mean.is_some());
     }
 
     #[test]

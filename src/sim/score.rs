@@ -13,7 +13,6 @@ pub struct Score {
     target: f64,
     begun: Option<(Stamp, f64)>,
     ended: Option<(Stamp, f64)>,
-    tracked_from: Option<f64>,
     refused: u64,
     /// Measured width over path.
     pub widths: Vec<AlongBead>,
@@ -50,28 +49,6 @@ impl Score {
         }
     }
 
-    /// Path from where control began to where the width of the bead laid there
-    /// stays within a band of the target for good \[mm\]; `None` if it never
-    /// does.
-    pub fn settles_within(&self, band_mm: f64) -> Option<f64> {
-        let from = self.tracked_from?;
-        let outside = self.widths.iter().rposition(|(_, w)| (w - self.target).abs() > band_mm);
-        let settled = match outside {
-            None => from,
-            Some(last) => self.widths.get(last + 1)?.0,
-        };
-        Some((settled - from).max(0.0))
-    }
-
-    /// Standard deviation of the bead's width over the part laid more than
-    /// `after_mm` past the beginning of control \[mm\].
-    pub fn scatter(&self, widths: &[AlongBead], after_mm: f64) -> f64 {
-        let from = self.tracked_from.unwrap_or(0.0) + after_mm;
-        let late = || widths.iter().filter(|(at, _)| *at >= from).map(|(_, width)| *width);
-        let middle = mean(late());
-        mean(late().map(|width| (width - middle) * (width - middle))).sqrt()
-    }
-
     /// Frames that showed bead and were refused.
     pub fn refused(&self) -> u64 {
         self.refused
@@ -83,16 +60,13 @@ impl Score {
 }
 
 impl Witness for Score {
-    fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
+    fn step(&mut self, now: Stamp, event: &Event, _: &Step) {
         let Event::Robot(state) = event else { return };
         let path = state.path_mm.get();
         if state.mode == RobotMode::Print {
             let (_, start) = *self.begun.get_or_insert((now, path));
             self.ended = Some((now, path));
             self.speeds.push((path - start, state.speed_mm_per_s.get()));
-            if step.state.name() == "tracking" {
-                self.tracked_from.get_or_insert(path - start);
-            }
         }
     }
 
@@ -111,19 +85,19 @@ impl Witness for Score {
     }
 }
 
-/// Mean of some values; 0 of none.
+/// Mean of some values; not a number of none.
 pub fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, n) = values.fold((0.0, 0.0), |(sum, n), value| (sum + value, n + 1.0));
-    if n > 0.0 { sum / n } else { 0.0 }
+    sum / n
 }
 
-/// Median of some values, the mean of the middle two where there are two; 0 of
-/// none.
+/// Median of some values, the mean of the middle two where there are two; not a number
+/// of none.
 pub fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
     match values.len() {
-        0 => 0.0,
+        0 => f64::NAN,
         n if n % 2 == 1 => values[middle],
         _ => f64::midpoint(values[middle - 1], values[middle]),
     }
@@ -134,20 +108,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_layer_that_settles_says_where() {
+    fn what_was_never_seen_has_no_error() {
         let mut score = Score::new(42.0);
-        score.tracked_from = Some(200.0);
+        assert!(score.mean_error().is_nan() && score.rms_error().is_nan());
         score.widths = vec![(100.0, 38.6), (300.0, 41.0), (500.0, 41.6), (700.0, 42.1)];
-        assert_eq!(score.settles_within(0.5), Some(300.0));
-        assert_eq!(score.settles_within(0.05), None);
         assert!((score.mean_error() - (3.4 + 1.0 + 0.4 + 0.1) / 4.0).abs() < 1e-12);
-        assert!((score.scatter(&score.widths, 250.0) - 0.25).abs() < 1e-12);
     }
 
     #[test]
     fn the_median_of_an_even_number_lies_between_the_middle_two() {
         assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), 2.5);
         assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(&mut []), 0.0);
+        assert!(median(&mut []).is_nan());
     }
 }

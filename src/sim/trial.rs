@@ -21,8 +21,10 @@ pub struct Trial {
     /// Width of the bead itself, every half millimetre.
     pub bead: Vec<AlongBead>,
     /// Where the nozzle was when the first controlled setpoint was sent
-    /// \[mm\].
+    /// \[mm\]; infinite where there was none.
     pub begun_mm: f64,
+    /// Whether it was laid to its end; the controller stopped it otherwise.
+    pub whole: bool,
     target_mm: f64,
 }
 
@@ -50,7 +52,7 @@ impl Trial {
         let target_mm = run.control.target.nominal().get();
         let mut sim = SimCell::told(&cell, run, factor, calibration.clone(), NoRecorder)?;
         let mut watch = Watch { score: Score::new(target_mm), newest: None, begun: None };
-        let _ = sim.layer(Mm::ZERO, &mut watch);
+        let end = sim.layer(Mm::ZERO, &mut watch);
         let mut bead = Vec::new();
         let mut at = 0.0;
         while at < cell.simulation.path.get() {
@@ -58,22 +60,27 @@ impl Trial {
             at += EVERY_MM;
         }
         let begun_mm = watch.begun.unwrap_or(f64::INFINITY);
-        Ok(Self { score: watch.score, bead, begun_mm, target_mm })
+        Ok(Self { score: watch.score, bead, begun_mm, whole: end.whole, target_mm })
     }
 
     /// Way from a place to where the bead stays within a band of the target for
-    /// good \[mm\]; infinite if it never does.
+    /// good \[mm\]; infinite if it never does, or no bead lies there.
     pub fn settles_within(&self, from_mm: f64, band_mm: f64) -> f64 {
         let outside =
             |(at, width): &AlongBead| *at >= from_mm && (width - self.target_mm).abs() > band_mm;
         match self.bead.iter().rposition(outside) {
+            None if self.errors(from_mm).next().is_none() => f64::INFINITY,
             None => 0.0,
             Some(last) => self.bead.get(last + 1).map_or(f64::INFINITY, |(at, _)| at - from_mm),
         }
     }
 
-    /// Integral of the error's size over the path from a place on \[mm²\].
+    /// Integral of the error's size over the path from a place on \[mm²\]; not a number,
+    /// as all that follows, where no bead lies there.
     pub fn error_integral(&self, from_mm: f64) -> f64 {
+        if self.errors(from_mm).next().is_none() {
+            return f64::NAN;
+        }
         self.errors(from_mm).map(|error| error.abs() * EVERY_MM).sum()
     }
 

@@ -198,7 +198,9 @@ impl Changes {
         let Some((look, last)) = self.looks.get(first).zip(self.looks.back()) else {
             return false;
         };
-        look.calm || last.place_mm - look.place_mm > LONG * self.gauge_mm
+        // From nothing to something is no change.
+        look.before.is_known()
+            && (look.calm || last.place_mm - look.place_mm > LONG * self.gauge_mm)
     }
 
     /// Where a change would lie that a width is the first to show: just within

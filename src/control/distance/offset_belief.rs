@@ -161,7 +161,7 @@ mod tests {
     /// A bead of exponent 0.25 whose speed steps once, seen `offset` behind the
     /// nozzle by a law that was told 88.4 mm.
     fn seen(offset: f64) -> OffsetBelief {
-        let mut trail = Trail::new(100.0);
+        let mut trail = Trail::new(100.0, 1e3);
         let mut belief = OffsetBelief::new(0.1);
         for k in 0..400 {
             let at = 0.02 * f64::from(k);

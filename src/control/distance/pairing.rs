@@ -133,7 +133,7 @@ mod tests {
     use super::*;
 
     fn trail() -> Trail {
-        let mut trail = Trail::new(100.0);
+        let mut trail = Trail::new(100.0, 1e3);
         for k in 0..60 {
             let at = 0.02 * f64::from(k);
             let (first, second) = (at.min(0.6), (at - 0.6).max(0.0));

@@ -209,3 +209,53 @@ fn a_width_that_was_laid_while_the_flow_was_changed_far_says_nothing() {
     assert_eq!(at(early), Use::NotPaired);
     assert_ne!(at(late), Use::NotPaired);
 }
+
+#[test]
+fn the_law_is_the_same_for_a_bead_of_any_width() {
+    for times in [0.05, 1.0, 6.0] {
+        let mut law =
+            ByDistance::new(DistanceSettings { offset_sigma: Mm::constant(0.5), ..settings() });
+        let mut seen = Vec::new();
+        let mut path = 0.0;
+        for k in 0..600_u32 {
+            // Told apart by 10 % of the speed every 200 mm.
+            let speed = if (path / 200.0) as i64 % 2 == 0 { 100.0 } else { 110.0 };
+            path += speed * STEP_S;
+            let now = Stamp::from_secs(STEP_S * f64::from(k + 1));
+            law.reported(now, Mm::constant(path), MmPerS::constant(speed), 1.0);
+            let place = path - OFFSET;
+            let laid = if (place / 200.0) as i64 % 2 == 0 { 100.0 } else { 110.0 };
+            // Widths of bead laid at two speeds are not what this is about.
+            let near = (place - GAUGE).div_euclid(200.0) != (place + GAUGE).div_euclid(200.0);
+            if place < GAUGE || near {
+                continue;
+            }
+            let [random, _] = hash::normal_pair(hash::mix(&[5, u64::from(k)]));
+            let width = times * 40.0 * (f64::powf(laid / 112.5, -0.25) + 0.009 * random);
+            let (width, sigma) = (Mm::constant(width), Mm::constant(times * 40.0 * 0.009));
+            let trace = law.measured(Mm::constant(path), (width, sigma), width);
+            assert!(law.is_ready());
+            seen.push((trace.use_of_width, trace.level_mm.get() / times));
+        }
+        assert!(seen.iter().all(|(taken, _)| *taken != Use::Change), "{times}: {seen:?}");
+        let last = seen.last().unwrap().1;
+        assert!((last - 40.0).abs() < 0.3, "{times}: {last}");
+    }
+}
+
+#[test]
+fn a_bead_that_is_never_paired_with_a_speed_is_told() {
+    // The gauge reaches beyond the nozzle.
+    let near = DistanceSettings { offset: Mm::constant(5.0), ..settings() };
+    let mut line = Line::new(near);
+    while line.path < OFFSET + 60.0 {
+        let _ = line.step(0.25, |_| 1.0, 0.36);
+    }
+    assert_eq!(line.law.distrust(), None);
+    while line.path < OFFSET + 120.0 {
+        let _ = line.step(0.25, |_| 1.0, 0.36);
+    }
+    assert_eq!(line.law.distrust(), Some(Distrust::Unpaired));
+    line.law.begin_bead();
+    assert_eq!(line.law.distrust(), None);
+}

@@ -2,9 +2,9 @@
 
 use std::collections::VecDeque;
 
-/// Nodes that are kept: at the fastest reports and a speed that never stands
-/// still more than 10 s, and as long as the speed is steady any length.
-const KEPT: usize = 1024;
+/// Most nodes that are kept, whatever the reach: at the fastest reports and a speed that
+/// never stands still more than ten minutes.
+const MOST: usize = 1 << 16;
 /// Speed below which a bead has no width that the model could tell \[mm/s\].
 const SLOWEST_MM_PER_S: f64 = 0.5;
 /// Share of the speed within which two reports tell the same speed.
@@ -24,6 +24,8 @@ const USUAL_S: f64 = 3.0;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trail {
     reference_mm_per_s: f64,
+    /// Length behind the newest report that is kept \[mm\].
+    reach_mm: f64,
     nodes: VecDeque<Node>,
     /// Speed of the newest report \[mm/s\].
     speed: f64,
@@ -58,12 +60,14 @@ pub struct LnSpeed {
 }
 
 impl Trail {
-    /// An empty one, for a reference speed v₀ \[mm/s\].
-    pub fn new(reference_mm_per_s: f64) -> Self {
+    /// An empty one, for a reference speed v₀ \[mm/s\], that knows the last piece of bead as
+    /// long as its reach \[mm\].
+    pub fn new(reference_mm_per_s: f64, reach_mm: f64) -> Self {
         let reference_mm_per_s = reference_mm_per_s.max(SLOWEST_MM_PER_S);
         Self {
             reference_mm_per_s,
-            nodes: VecDeque::with_capacity(KEPT),
+            reach_mm,
+            nodes: VecDeque::new(),
             speed: 0.0,
             flow_share: 1.0,
             usual: None,
@@ -138,7 +142,8 @@ impl Trail {
         let speed = speed.max(SLOWEST_MM_PER_S) / self.flow_share;
         let ln = libm::log(speed / self.reference_mm_per_s);
         let way = path_mm - last.path_mm;
-        if self.nodes.len() >= KEPT {
+        let needless = |node: &Node| node.path_mm < path_mm - self.reach_mm;
+        while self.nodes.len() >= MOST || self.nodes.get(1).is_some_and(needless) {
             self.nodes.pop_front();
         }
         let (sum, square) = (last.sum + ln * way, last.square + ln * ln * way);
@@ -206,7 +211,7 @@ mod tests {
     /// A robot that drives at one speed and changes to another at once, after
     /// 1.03 s, with reports every 0.1 s.
     fn stepped(first: f64, second: f64) -> Trail {
-        let mut trail = Trail::new(100.0);
+        let mut trail = Trail::new(100.0, 1e3);
         for k in 0..40 {
             let at = 0.1 * f64::from(k);
             let (before, after) = (at.min(1.03), (at - 1.03).max(0.0));
@@ -238,6 +243,23 @@ mod tests {
         assert_eq!(trail.time_at(900.0), None);
         assert!(trail.near(-20.0, -10.0).unwrap().mean.abs() < 1e-9);
         assert!((trail.near(500.0, 510.0).unwrap().mean - 0.5_f64.ln()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_slow_robot_is_known_as_far_back_as_the_camera_looks() {
+        // 5 mm/s, never the same, reported every 20 ms: 300 mm are a minute.
+        let mut trail = Trail::new(100.0, 300.0);
+        let (mut path, mut most) = (0.0, 0);
+        for k in 0..20_000 {
+            let speed = 5.0 + 0.1 * f64::from(k % 7);
+            path += 0.02 * speed;
+            trail.report(0.02 * f64::from(k), path, speed, 1.0);
+            most = most.max(trail.nodes.len());
+        }
+        let back = trail.over(path - 299.0, path - 290.0).unwrap();
+        assert!((back.mean - 0.053_f64.ln()).abs() < 1e-2, "{back:?}");
+        assert!(trail.over(path - 310.0, path - 300.0).is_none());
+        assert!((2_000..10_000).contains(&most), "{most}");
     }
 
     #[test]

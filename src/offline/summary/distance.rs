@@ -39,6 +39,10 @@ impl DistanceSummary {
         });
         let fallback = self.fallback.map_or("", |why| match why {
             Distrust::NoPath => " The PI law took over: the robot reports no path.",
+            Distrust::Unpaired => {
+                " The PI law took over: the bead under the camera is none whose speed is known; is \
+                 offset_mm right?"
+            }
             Distrust::ModelContradicted => {
                 " The PI law took over: the width did not answer the speed as the model says."
             }

@@ -5,15 +5,11 @@ use super::{Contender, scale};
 use crate::config::cell::{Cell, RunPart};
 use crate::config::rendered::Level;
 use crate::sim::cell::SimError;
+use crate::sim::compare::{JUDGED_AFTER_MM, SCATTER_AFTER_MM};
 use crate::sim::score::{Score, median};
 use crate::sim::trial::Trial;
 use crate::units::Mm;
 use crate::vision::Method;
-
-/// Way after control began from which the bead itself is judged \[mm\].
-const JUDGED_AFTER_MM: f64 = 30.0;
-/// The same from which its scatter is that of control alone \[mm\].
-const SCATTER_AFTER_MM: f64 = 700.0;
 
 /// What a layer came to, as the median over seeds.
 #[derive(Debug, Clone, PartialEq)]
