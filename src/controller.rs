@@ -153,6 +153,8 @@ pub struct Controller {
     ended: bool,
     link_up: bool,
     robot: Option<RobotState>,
+    /// The path in the last report, on whatever connection.
+    path: Option<Mm>,
     transport: Transport,
     odometer: Odometer,
     /// The law by distance, where the cell asks for it.
@@ -189,6 +191,7 @@ impl Controller {
             ended: false,
             link_up: false,
             robot: None,
+            path: None,
             transport: Transport::default(),
             odometer: Odometer::default(),
             distance,

@@ -22,7 +22,7 @@ fn controllers_are_told_apart_at_every_width() {
     assert!(said.contains("RMS error over that of the first"), "{said}");
     let json = std::fs::read_to_string(out.path().join("compare.json")).unwrap();
     let numbers: Vec<serde_json::Value> = serde_json::from_str(&json).unwrap();
-    assert_eq!(numbers.len(), 2 * 2 * 6);
+    assert_eq!(numbers.len(), 2 * 2 * 7);
     let ratio = |controller: &str, width: f64| {
         let found = numbers.iter().find(|number| {
             number["controller"] == controller
@@ -46,4 +46,18 @@ fn a_cell_with_an_extruder_of_its_own_and_widths_that_cannot_be_are_refused() {
     assert!(said.contains("found [extruder]"), "{said}");
     let said = refused(&["compare", &cell("distance.toml"), "--widths", "42,-3"]);
     assert!(said.contains("expected 0.1 to 1000 mm"), "{said}");
+    let said = refused(&["compare", &cell("distance.toml"), "--widths", "42,200"]);
+    assert!(said.contains("width_range_mm of distance"), "{said}");
+    let text = std::fs::read_to_string(cell("distance.toml")).unwrap();
+    let course =
+        text.replacen("[control]", "[control]\npath_mm = [0, 900]\npath_width_mm = [42, 38]", 1);
+    let changing = out.path().join("course.toml");
+    std::fs::write(&changing, course).unwrap();
+    let changing = changing.to_str().unwrap();
+    let said = refused(&["compare", changing]);
+    assert!(said.contains("expected one width"), "{said}");
+    let near = text.replacen("offset_mm = ", "offset_mm = 1.0 # ", 1);
+    std::fs::write(changing, near).unwrap();
+    let said = refused(&["compare", changing]);
+    assert!(said.contains("camera.offset_mm: found 1"), "{said}");
 }

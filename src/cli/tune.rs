@@ -11,15 +11,13 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 
 use super::cell::LoadedCell;
+use super::offset::recording::farthest;
 use super::{Voice, WrongArguments};
 use crate::config::cell::Purpose;
 use crate::config::control::STEP_SHARES;
 use crate::offline::output;
 use crate::offline::tuned::Tuned;
 use crate::units::Mm;
-
-/// Largest distance of the camera that is tried unless another is given.
-const FARTHEST: Mm = Mm::constant(1000.0);
 
 /// Finds what a cell is like from steps of its speed, and proposes settings.
 #[derive(Debug, Args)]
@@ -92,6 +90,7 @@ fn parse_share(text: &str) -> Result<f64, String> {
 
 /// Runs the command.
 pub fn run(args: &TuneArgs, voice: Voice) -> anyhow::Result<ExitCode> {
+    let farthest = farthest(args.max_mm)?;
     let loaded = LoadedCell::read(&args.cell, Purpose::Run)?;
     if let Some(path) = &args.write {
         write::refuse(path, &args.cell, &loaded)?;
@@ -107,7 +106,7 @@ pub fn run(args: &TuneArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     if !voice.quiet {
         tell!("looking at {}: this takes some seconds", recording.display());
     }
-    let tuned = analyse::tuned(&recording, &loaded, args.max_mm.unwrap_or(FARTHEST))?;
+    let tuned = analyse::tuned(&recording, &loaded, farthest)?;
     output::make_folder(&args.out)?;
     output::write_whole(&args.out, "tune.json", tuned.json().as_bytes())?;
     let page = output::write_whole(&args.out, "report.html", tuned.page().as_bytes())?;

@@ -85,7 +85,7 @@ pub struct DistanceTrace {
     pub use_of_width: Use,
     /// Width at the reference speed, A.
     pub level_mm: Mm,
-    /// Its standard deviation at the speed of this width.
+    /// Its standard deviation if the exponent is the one that is believed.
     pub level_sigma_mm: Mm,
     /// Exponent b.
     pub exponent: f64,

@@ -4,6 +4,7 @@ use super::{Controller, Phase, Stretch};
 use crate::control::follow::Verdict;
 use crate::control::{Fault, Hold, Limit, RobotLimits, RobotMode, RobotState};
 use crate::time::Stamp;
+use crate::units::Mm;
 
 /// Share of the setpoint at which a robot that starts has run up.
 const RUN_UP: f64 = 0.95;
@@ -12,7 +13,8 @@ impl Controller {
     pub(super) fn reported(&mut self, now: Stamp, state: &RobotState) {
         let state = &self.odometer.correct(now, state);
         self.transport.observe(now, state);
-        let before = self.robot.replace(*state);
+        self.robot = Some(*state);
+        let before = self.path.replace(state.path_mm);
         if self.ended {
             return;
         }
@@ -45,8 +47,9 @@ impl Controller {
         }
     }
 
-    fn printing(&mut self, now: Stamp, state: &RobotState, before: Option<RobotState>) {
-        let fresh = before.is_some_and(|last| state.path_mm < last.path_mm);
+    fn printing(&mut self, now: Stamp, state: &RobotState, before: Option<Mm>) {
+        // Also where the bead before ended while nobody heard the robot.
+        let fresh = before.is_some_and(|last| state.path_mm < last);
         // The extruder's law goes on over a new bead whose robot was not seen
         // idle: its pump never stood, and what the law knows of it still holds.
         if fresh {

@@ -70,7 +70,7 @@ impl Tuned {
         run: &RunPart,
     ) -> Result<Self, SimError> {
         let target_mm = run.control.target.nominal().get();
-        let proposal = propose(&plant, target_mm, &run.limits);
+        let proposal = propose(&plant, run);
         let world = World::new(cell, run, &plant);
         let now = Candidate::now(run);
         let laws =

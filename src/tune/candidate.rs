@@ -58,7 +58,7 @@ impl Candidate {
             name: name.to_owned(),
             law: WidthLaw::Distance(Exponent {
                 value: told.exponent,
-                learns: true,
+                learns: told.learns,
                 drift_per_root_m: told.drift_per_root_m,
             }),
             gains: None,

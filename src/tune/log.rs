@@ -14,7 +14,7 @@ pub struct Log {
     pub states: Vec<(Stamp, RobotState)>,
     /// Widths that were measured, by capture.
     pub widths: Vec<Width>,
-    /// From capture to arrival at the controller, for each of them \[s\].
+    /// From capture to arrival at the controller of each, in the order of arrival \[s\].
     pub latencies_s: Vec<f64>,
     /// Speeds that were sent, and when.
     pub setpoints: Vec<(Stamp, MmPerS)>,

@@ -240,13 +240,20 @@ fn as_found(simulation: &mut Simulation, plant: &Plant) {
     };
 }
 
+/// Shortest length over which a roughness hangs together \[mm\].
+const LEAST_ROUGH_MM: f64 = 0.1;
+
 /// A roughness that is found again in means over the gauge: of one that is alike as
 /// exp(−(distance/l)²), a mean over a long G keeps the share √π·l/G of the variance.
 fn roughness(plant: &Plant) -> Roughness {
-    let length_mm = (ROUGH_PART * plant.gauge_mm).max(0.1);
-    let size_mm = plant.scatter.rough * plant.width_mm.value
-        / (std::f64::consts::PI.sqrt() * ROUGH_PART).sqrt();
-    Roughness { size_mm, length_mm }
+    let seen_mm = plant.scatter.rough * plant.width_mm.value;
+    let length_mm = ROUGH_PART * plant.gauge_mm;
+    if length_mm < LEAST_ROUGH_MM {
+        // Widths at points are as rough as the bead.
+        return Roughness { size_mm: seen_mm, length_mm: LEAST_ROUGH_MM };
+    }
+    let kept = std::f64::consts::PI.sqrt() * ROUGH_PART;
+    Roughness { size_mm: seen_mm / kept.sqrt(), length_mm }
 }
 
 fn mm(value: f64) -> Mm {

@@ -5,6 +5,8 @@ use serde::Serialize;
 use super::noise::Drift;
 use super::plant::Plant;
 use super::stability::{LoopMargins, LoopPlant};
+use crate::config::cell::RunPart;
+use crate::config::control::WidthLaw;
 use crate::control::limiter::Limits;
 use crate::control::pi::PiGains;
 
@@ -37,6 +39,9 @@ pub struct DistanceProposal {
     pub offset_sigma_mm: f64,
     /// How far the flow wanders along a metre, as a share.
     pub drift_per_root_m: f64,
+    /// Whether b is learnt from the data: as the cell has it, and yes where its law is
+    /// another.
+    pub learns: bool,
 }
 
 /// Gains of the PI law on the error in mm, and the loop that they were made for.
@@ -50,12 +55,12 @@ pub struct PiProposal {
     pub margins: Option<LoopMargins>,
 }
 
-/// What follows from a plant for a width and limits.
-pub fn propose(plant: &Plant, target_mm: f64, limits: &Limits) -> Proposal {
-    let at = worst(plant, target_mm, limits);
+/// What follows from a plant for the width and the limits of a cell.
+pub fn propose(plant: &Plant, run: &RunPart) -> Proposal {
+    let at = worst(plant, run.control.target.nominal().get(), &run.limits);
     let gains = gains(&at);
     Proposal {
-        distance: by_distance(plant),
+        distance: by_distance(plant, run.control.law),
         pi: PiProposal { gains, at, margins: at.margins(gains) },
     }
 }
@@ -65,7 +70,7 @@ pub fn worst(plant: &Plant, target_mm: f64, limits: &Limits) -> LoopPlant {
     LoopPlant::at(plant, target_mm, limits.min_speed.get().max(1.0))
 }
 
-fn by_distance(plant: &Plant) -> DistanceProposal {
+fn by_distance(plant: &Plant, law: WidthLaw) -> DistanceProposal {
     let drift_per_root_m = match plant.scatter.drift {
         Drift::Found { per_root_m, .. } => per_root_m,
         Drift::AtMost(most) => USUAL_DRIFT.min(most),
@@ -75,6 +80,7 @@ fn by_distance(plant: &Plant) -> DistanceProposal {
         offset_mm: plant.offset_mm.value,
         offset_sigma_mm: plant.offset_mm.sigma.max(LEAST_OFFSET_SIGMA_MM),
         drift_per_root_m: drift_per_root_m.clamp(DRIFTS.0, DRIFTS.1),
+        learns: if let WidthLaw::Distance(now) = law { now.learns } else { true },
     }
 }
 

@@ -29,6 +29,8 @@ const FINEST_S: f64 = 1e-5;
 const LEAST_STEP: f64 = 0.01;
 /// Steps below which dead time and lag are not told.
 const FEWEST_STEPS: usize = 3;
+/// Reports that are needed.
+const FEWEST_REPORTS: usize = 20;
 /// Longest time between two reports that the answer is followed over.
 const LONGEST_GAP: Span = Span::from_millis(500);
 /// Part of a lag within which its end shows in the reports.
@@ -59,6 +61,15 @@ pub enum RobotError {
     )]
     TooFewSteps {
         /// Steps that were sent.
+        found: usize,
+    },
+    /// The robot hardly reported while it went by setpoints.
+    #[error(
+        "only {found} reports are of a robot that prints by setpoints, and {FEWEST_REPORTS} are \
+         needed to see how it answers them"
+    )]
+    TooFewReports {
+        /// Reports that were.
         found: usize,
     },
     /// The reported speed follows something else.
@@ -92,13 +103,15 @@ pub fn answer(log: &Log) -> Result<RobotAnswer, RobotError> {
         return Err(RobotError::TooFewSteps { found: steps });
     }
     let reports = printing(&log.states, told[0].0);
+    if reports.len() < FEWEST_REPORTS {
+        return Err(RobotError::TooFewReports { found: reports.len() });
+    }
     let count = number(reports.len());
     let squares = |at: Answer| squares(&told, &reports, at);
     let best = search(&squares);
-    let left = squares(best) / count.max(1.0);
-    let mean = reports.iter().map(|report| report.speed).sum::<f64>() / count.max(1.0);
-    let moved =
-        reports.iter().map(|report| (report.speed - mean).powi(2)).sum::<f64>() / count.max(1.0);
+    let left = squares(best) / count;
+    let mean = reports.iter().map(|report| report.speed).sum::<f64>() / count;
+    let moved = reports.iter().map(|report| (report.speed - mean).powi(2)).sum::<f64>() / count;
     if left > 0.25 * moved {
         return Err(RobotError::DoesNotFollow { left: left.sqrt(), moved: moved.sqrt() });
     }

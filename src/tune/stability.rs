@@ -100,8 +100,10 @@ impl LoopPlant {
         let gain = 1.0 / self.size(gains, turned);
         let is_stable = gain > 1.0;
         let crossover = falling(|w| self.size(gains, w) - 1.0);
-        let phase = crossover.map_or(f64::NEG_INFINITY, |w| PI + self.phase(gains, w));
-        let delay_s = crossover.map_or(f64::NEG_INFINITY, |w| (PI + self.phase(gains, w)) / w);
+        // A gain that is below 1 throughout leaves any phase, one above it none.
+        let none = if is_stable { f64::INFINITY } else { f64::NEG_INFINITY };
+        let phase = crossover.map_or(none, |w| PI + self.phase(gains, w));
+        let delay_s = crossover.map_or(none, |w| (PI + self.phase(gains, w)) / w);
         Some(LoopMargins {
             is_stable,
             gain,
@@ -133,9 +135,12 @@ fn first(end: f64, of: impl Fn(f64) -> f64) -> Option<f64> {
     Some(halved(at(k - 1), at(k), of))
 }
 
-/// The zero of a function that falls; none where it is positive throughout.
+/// The zero of a function that falls; none where it is positive throughout, or nowhere.
 fn falling(of: impl Fn(f64) -> f64) -> Option<f64> {
     let (mut low, mut high) = (1e-9, 1e-9);
+    if of(low) <= 0.0 {
+        return None;
+    }
     while of(high) > 0.0 {
         low = high;
         high *= 2.0;

@@ -280,6 +280,11 @@ fn an_integral_behind_a_dead_time_has_the_margins_of_the_closed_form() {
         assert!((found.delay_s - FRAC_PI_2 * (1.0 - share) / cross).abs() < 1e-9);
         assert_eq!(found.is_stable, share < 1.0);
     }
+    // A proportional part that never brings the gain to 1 has no crossover.
+    let weak = PiGains { kp_per_s: 0.5 / plant.gain_s, ki_per_s2: 0.0 };
+    let found = plant.margins(weak).unwrap();
+    assert!(found.is_stable && (found.gain - 2.0).abs() < 1e-9);
+    assert_eq!((found.phase_deg, found.delay_s), (f64::INFINITY, f64::INFINITY));
     let still = PiGains { kp_per_s: 0.0, ki_per_s2: 0.0 };
     assert_eq!(plant.margins(still), None);
 }

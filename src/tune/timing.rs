@@ -14,7 +14,7 @@ pub struct Timing {
     pub latency_s: f64,
     /// The same, which one of a hundred exceeds.
     pub latency_p99_s: f64,
-    /// Time from frame to frame.
+    /// Time from one measured frame to the next.
     pub frame_s: f64,
     /// Time from report to report.
     pub report_s: f64,

@@ -24,11 +24,7 @@ const SHORTEST_SEARCH_MM: f64 = 20.0;
 
 /// Runs the command for a recording.
 pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
-    let farthest = args.max_mm.unwrap_or(FARTHEST);
-    if farthest.get() < SHORTEST_SEARCH_MM {
-        let what = format!("--max-mm: found {farthest}, expected {SHORTEST_SEARCH_MM} mm or more");
-        return Err(WrongArguments::new(what).into());
-    }
+    let farthest = farthest(args.max_mm)?;
     let mut recording = Recording::open(&args.input).map_err(WrongArguments::new)?;
     let cell = match &args.cell {
         Some(path) => Some(LoadedCell::read(path, Purpose::Measure)?),
@@ -51,12 +47,26 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Length of the gauge on the surface of then.
+/// Largest distance that is tried, from what was asked for.
+pub fn farthest(max: Option<Mm>) -> Result<Mm, WrongArguments> {
+    let farthest = max.unwrap_or(FARTHEST);
+    if farthest.get() < SHORTEST_SEARCH_MM {
+        let what = format!("--max-mm: found {farthest}, expected {SHORTEST_SEARCH_MM} mm or more");
+        return Err(WrongArguments::new(what));
+    }
+    Ok(farthest)
+}
+
+/// Length of the gauge on the surface of then, or that of the simulation where no frame was
+/// rendered.
 pub fn gauge(
     cell: &Cell,
     calibration: &Calibration,
     states: &[(Stamp, RobotState)],
 ) -> anyhow::Result<Mm> {
+    if cell.simulates_widths() {
+        return Ok(cell.gauge_length(calibration));
+    }
     // Afterwards the robot may lift the camera.
     let laying = states.iter().filter(|(_, state)| state.mode.lays_bead());
     let mut heights: Vec<f64> = laying.map(|(_, state)| state.z_mm.get()).collect();

@@ -14,19 +14,12 @@ use crate::offline::tuned::Tuned;
 use crate::tune::{Facts, Log, Plant};
 use crate::units::Mm;
 
-/// Smallest range of distances that is a range \[mm\].
-const SHORTEST_SEARCH_MM: f64 = 20.0;
-
 /// How far beyond the limits, as a factor, the target's speed may lie for anything to be
 /// foretold.
 const FAR: f64 = 3.0;
 
 /// Reads a recording and looks at it with the eyes of a cell.
 pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<Tuned> {
-    if farthest.get() < SHORTEST_SEARCH_MM {
-        let what = format!("--max-mm: found {farthest}, expected {SHORTEST_SEARCH_MM} mm or more");
-        return Err(WrongArguments::new(what).into());
-    }
     let name = path.display().to_string();
     let mut recording = Recording::open(path).map_err(WrongArguments::new)?;
     let log = log(&mut recording).context("the recording cannot be read on")?;
@@ -36,11 +29,7 @@ pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<T
     // The gauge is that of the run, whatever the cell has become since.
     let (cell, calibration) = attached(&recording, Purpose::Run)
         .unwrap_or_else(|_| (loaded.cell.clone(), loaded.calibration.clone()));
-    let gauge = if cell.simulates_widths() {
-        cell.gauge_length(&calibration)
-    } else {
-        gauge(&cell, &calibration, &log.states)?
-    };
+    let gauge = gauge(&cell, &calibration, &log.states)?;
     let run = loaded.cell.run.as_ref().context("the cell was not read for a run")?;
     let facts = Facts { gauge, farthest, start_speed: run.robot.start_speed };
     let plant = Plant::of(&log, &facts).with_context(|| {

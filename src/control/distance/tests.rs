@@ -212,6 +212,7 @@ fn a_width_that_was_laid_while_the_flow_was_changed_far_says_nothing() {
 
 #[test]
 fn the_law_is_the_same_for_a_bead_of_any_width() {
+    let driven = |at: f64| if at.rem_euclid(400.0) < 200.0 { 100.0 } else { 110.0 };
     for times in [0.05, 1.0, 6.0] {
         let mut law =
             ByDistance::new(DistanceSettings { offset_sigma: Mm::constant(0.5), ..settings() });
@@ -219,12 +220,12 @@ fn the_law_is_the_same_for_a_bead_of_any_width() {
         let mut path = 0.0;
         for k in 0..600_u32 {
             // Told apart by 10 % of the speed every 200 mm.
-            let speed = if (path / 200.0) as i64 % 2 == 0 { 100.0 } else { 110.0 };
+            let speed = driven(path);
             path += speed * STEP_S;
             let now = Stamp::from_secs(STEP_S * f64::from(k + 1));
             law.reported(now, Mm::constant(path), MmPerS::constant(speed), 1.0);
             let place = path - OFFSET;
-            let laid = if (place / 200.0) as i64 % 2 == 0 { 100.0 } else { 110.0 };
+            let laid = driven(place);
             // Widths of bead laid at two speeds are not what this is about.
             let near = (place - GAUGE).div_euclid(200.0) != (place + GAUGE).div_euclid(200.0);
             if place < GAUGE || near {

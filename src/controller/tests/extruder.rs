@@ -273,3 +273,33 @@ fn a_bead_that_was_broken_off_is_planned_again_and_one_that_was_laid_is_not() {
     // The second bead's plan is at its end there, and slows down nowhere.
     assert!((halfway(&mut cell) - SPEED).abs() < 1e-3);
 }
+
+#[test]
+fn a_bead_that_begins_while_the_link_is_down_is_the_next_of_the_plan() {
+    let mut cell = planned();
+    cell.path = 995.0;
+    let _ = cell.go(0.02);
+    // As it would be had the bead begun at 0.
+    cell.mode = RobotMode::Idle;
+    let _ = cell.go(0.02);
+    (cell.mode, cell.path) = (RobotMode::Print, 0.0);
+    let _ = cell.go(0.02);
+    cell.path = 995.0;
+    let _ = cell.go(0.02);
+    assert!((cell.line.tick().unwrap() - SPEED / 2.0).abs() < 1e-3);
+    let _ = cell.line.give(&Event::LinkDown { reason: "no STATE for 500 ms".into() });
+    cell.line.now += 1.0;
+    let robot = RobotLimits {
+        name: "sim".into(),
+        min_mm_per_s: MmPerS::constant(10.0),
+        max_mm_per_s: MmPerS::constant(200.0),
+        hold_mm_per_s: MmPerS::constant(80.0),
+    };
+    let _ = cell.line.give(&Event::LinkUp { robot });
+    cell.path = 20.0;
+    let _ = cell.go(0.02);
+    cell.path = 600.0;
+    let _ = cell.go(0.02);
+    // The second bead's plan slows down nowhere.
+    assert!((cell.line.tick().unwrap() - SPEED).abs() < 1e-3);
+}

@@ -22,13 +22,16 @@ pub(super) struct Rise {
 const RISE_S: [f64; 2] = [0.005, 10.0];
 /// So many samples in a row above half the flow are no noise.
 const IN_A_ROW: usize = 3;
+/// Starts that must each tell T: of fewer there is no spread to speak of.
+const FEWEST_RISES: usize = 3;
 
 /// The median of the time constants of all starts, and the delay of each with
 /// that.
 pub(super) fn fit(starts: &[Episode], fall: &Falling) -> Result<Rise, StartStopFitError> {
     let fall = fall.model();
     let rises: Vec<f64> = starts.iter().filter_map(|start| alone(start, &fall)).collect();
-    let (rise_s, sigma_s) = middle(&rises).ok_or(StartStopFitError::NoFit { what: "rise" })?;
+    let told = middle(&rises).filter(|_| rises.len() >= FEWEST_RISES);
+    let (rise_s, sigma_s) = told.ok_or(StartStopFitError::NoFit { what: "rise" })?;
     if let Some(start) = starts.first().filter(|start| rise_s < start.step_s) {
         return Err(StartStopFitError::TooSparse { step_s: start.step_s, rise_s });
     }

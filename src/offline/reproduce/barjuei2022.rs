@@ -72,8 +72,10 @@ pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, Reprod
     progress.advance();
     work.tower()?;
     progress.advance();
+    let disturbed = ahead::disturbed_seeds(seeds);
     let about = format!(
-        "Medians over {seeds} seeds, {frame_seeds} where every frame is rendered. Errors are \
+        "Medians over {seeds} seeds, {frame_seeds} where every frame is rendered; means over \
+         {disturbed} for flow sines and pulsations, and where it says mean. Errors are \
          those of the measured width over all bead of a 2 m layer that the camera saw, or, where \
          it says so, of the bead itself from 30 mm after control began. Ours is the law by \
          distance, which is told the camera's distance, the noise, b = 0.25 and nothing else of \
@@ -127,6 +129,9 @@ impl Experiments {
         let (theirs, ours) = (lay(Method::EdgeLines)?, lay(Method::Caliper)?);
         let case = format!("{} mm, frames rendered", layer.target_mm);
         self.tables(&case, layer, &theirs, Some(&ours));
+        #[expect(clippy::cast_precision_loss, reason = "frames are few")]
+        let refused = [None, Some(theirs.refused as f64), Some(ours.refused as f64)];
+        self.rows.push(&case, ("frames of all seeds refused", "1"), refused);
         Ok(())
     }
 

@@ -85,21 +85,28 @@ pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, Reprod
     progress.advance();
     Ok(Reproduced {
         title: "Bead characterisation thesis",
-        about: about(seeds),
+        about: about(effort),
         rows: rows.into_vec(),
         sections,
     })
 }
 
-fn about(seeds: u64) -> String {
+fn about(effort: Effort) -> String {
+    let of = |usual: u64| effort.seeds.unwrap_or(usual);
+    let seeds = of(SEEDS);
     format!(
-        "Means over {seeds} seeds; the section is judged about its own mean from 15 to 90 s. Off, \
+        "Means over {seeds} seeds; over {fits} for the models of the flow, {starts} for starts and \
+         stops, {corner} for the corner, {camera} for the camera's distance. The section is judged about its own mean from 15 to 90 s. Off, \
          the simulated sections scatter more than the published ones, because the thesis does not \
          say how far its voltage went; widths follow from sections at a height of 3.65 mm, \
          while the thesis' bead changed its shape as well. Of the 17 % that no model tells, the \
          thesis' feedforward leaves all; ours reads the melt pressure at 50 Hz (noise of Ma et al. \
          2026) and supposes that the unmodelled flow shows in it. A camera alone comes too late: \
-         the noise is forgotten within 0.15 s, and the bead needs longer to be seen."
+         the noise is forgotten within 0.15 s, and the bead needs longer to be seen.",
+        fits = of(FIT_SEEDS),
+        starts = of(START_SEEDS),
+        corner = of(corner::SEEDS),
+        camera = seeds.min(CAMERA_SEEDS),
     )
 }
 

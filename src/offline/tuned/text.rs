@@ -101,7 +101,7 @@ impl Tuned {
     fn timing_words(&self) -> String {
         let timing = &self.plant.timing;
         format!(
-            "widths {:.1} ms late ({:.1} ms p99); frames every {:.1} ms, reports {:.1} ms ({:.1} ms \
+            "widths {:.1} ms late ({:.1} ms p99); measured frames every {:.1} ms, reports {:.1} ms ({:.1} ms \
              p99), setpoints {:.1} ms",
             1e3 * timing.latency_s,
             1e3 * timing.latency_p99_s,
@@ -175,6 +175,8 @@ impl Tuned {
     pub fn lines(&self) -> String {
         let mut text =
             String::from("# proposed; nothing is applied\n[control]\nlaw = \"distance\"\n");
+        let learns = if self.proposal.distance.learns { "yes" } else { "no" };
+        let _ = writeln!(text, "exponent_learns = \"{learns}\"");
         let settings = self.settings(true, 1.0);
         for table in ["control", "camera"] {
             if table == "camera" {
@@ -182,10 +184,13 @@ impl Tuned {
             }
             for (_, key, value) in settings.iter().filter(|(of, ..)| *of == table) {
                 let comment = match *key {
-                    "kp_per_s" => "  # fallen back to, or with law = \"pi\"; error_unit_mm = 1",
+                    "kp_per_s" => "  # fallen back to, or with law = \"pi\"",
                     _ => "",
                 };
                 let _ = writeln!(text, "{key} = {value}{comment}");
+                if *key == "ki_per_s2" {
+                    text.push_str("error_unit_mm = 1.0  # the unit of these gains\n");
+                }
             }
         }
         text
@@ -207,6 +212,11 @@ fn row(text: &mut String, one: &Prediction) {
     );
 }
 
+/// A margin that may have no end.
+fn told(margin: f64, words: impl Fn(f64) -> String) -> String {
+    if margin.is_finite() { words(margin) } else { "no end".to_owned() }
+}
+
 /// Margins as they are told.
 pub fn margin_words(margins: Option<LoopMargins>) -> [String; 4] {
     let Some(margins) = margins else { return ["–", "–", "–", "–"].map(str::to_owned) };
@@ -216,8 +226,8 @@ pub fn margin_words(margins: Option<LoopMargins>) -> [String; 4] {
     }
     [
         format!("{:.2}", margins.gain),
-        format!("{:.0}°", margins.phase_deg),
-        format!("{:.2} s", margins.delay_s),
+        told(margins.phase_deg, |phase| format!("{phase:.0}°")),
+        told(margins.delay_s, |delay| format!("{delay:.2} s")),
         margins.sensitivity.map_or("–".to_owned(), |most| format!("{most:.2}")),
     ]
 }

@@ -11,7 +11,7 @@ use crate::sim::corner::{
 };
 
 /// Seeds of the flow that no model tells.
-const SEEDS: u64 = 20;
+pub const SEEDS: u64 = 20;
 /// Times that may be added \[s\]; of the last one there are figures.
 const BUDGETS_S: [f64; 8] = [0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0];
 /// With fewer seeds than this the experiment is a quick one, and takes fewer times.
