@@ -59,8 +59,13 @@ pub enum JobError {
         way_mm: f64,
     },
     /// The speeds make no profile; points are the rows below the heading.
-    #[error("the speeds: {0}")]
-    Profile(#[from] ProfileError),
+    #[error("{}the speeds: {error}", line.map_or(String::new(), |line| format!("line {line}: ")))]
+    Profile {
+        /// The line of the point that is wrong, if one is.
+        line: Option<u64>,
+        /// What is wrong with it.
+        error: ProfileError,
+    },
 }
 
 /// A way may be longer than its path by rounding: this share of it and this much \[mm\].
@@ -76,7 +81,7 @@ pub fn read(text: &str) -> Result<Job, JobError> {
     let (path, speed) = ((PATH, place(PATH)?), (SPEED, place(SPEED)?));
     let [x, y, z] = POSITION.map(|column| place(column).map(|at| (column, at)));
     let axes = [x?, y?, z?];
-    let (mut nodes, mut position) = (Vec::new(), Vec::new());
+    let (mut nodes, mut position, mut lines) = (Vec::new(), Vec::new(), Vec::new());
     let mut before: Option<(f64, [f64; 3])> = None;
     for record in reader.records() {
         let record = record.map_err(|error| of_row(&error))?;
@@ -86,11 +91,16 @@ pub fn read(text: &str) -> Result<Job, JobError> {
         if let Some(before) = before {
             check_way(line, before, here)?;
         }
+        lines.push(line);
         nodes.push((here.0, number(speed)?));
         position.push(here);
         before = Some(here);
     }
-    Ok(Job { speed: SpeedProfile::new(&nodes)?, position })
+    let speed = SpeedProfile::new(&nodes).map_err(|error| {
+        let at = error.point().and_then(|point| point.checked_sub(1));
+        JobError::Profile { line: at.and_then(|at| lines.get(at).copied()), error }
+    })?;
+    Ok(Job { speed, position })
 }
 
 fn number(
@@ -153,6 +163,6 @@ mod tests {
         let words = word("100,50,50,", "80,50,50,");
         assert!(words.contains("line 4") && words.contains("30 mm of path"), "{words}");
         let words = word("50, 50, 0, 5, 2,", "0, 0, 0, 5, 2,");
-        assert!(words.contains("point 2"), "{words}");
+        assert!(words.contains("line 3") && words.contains("point 2"), "{words}");
     }
 }

@@ -47,6 +47,16 @@ pub enum ProfileError {
     },
 }
 
+impl ProfileError {
+    /// The point that is wrong, from 1, if one is.
+    pub const fn point(&self) -> Option<usize> {
+        match self {
+            Self::Order { at, .. } | Self::Speed { at, .. } => Some(*at),
+            Self::Short { .. } | Self::Stands { .. } | Self::Acceleration { .. } => None,
+        }
+    }
+}
+
 /// The speed along a path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpeedProfile {

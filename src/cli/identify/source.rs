@@ -42,7 +42,7 @@ impl Source {
         let text = String::from_utf8(bytes).map_err(|_| {
             wrong(&"this is no text; expected a table (CSV) with a line of names, or a recording")
         })?;
-        Table::parse(&text).map(Self::Table).with_context(|| name.clone())
+        Ok(Self::Table(Table::parse(&text).map_err(|error| wrong(&error))?))
     }
 }
 

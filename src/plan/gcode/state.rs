@@ -8,8 +8,8 @@ use super::{GcodeError, distance};
 /// offset, exact and continuous paths, no cycle, feeds a minute.
 const IDLE: [f64; 9] = [17.0, 40.0, 49.0, 54.0, 61.0, 64.0, 80.0, 90.1, 94.0];
 const MM_PER_INCH: f64 = 25.4;
-const KNOWN: &str = "G0 to G3, G17, G20, G21, G90, G91 and G94 are, and M, S, T, \
-                     E and N are passed over; write the move with these";
+const KNOWN: &str = "G0 to G3, G20, G21, G90 and G91 are, and what moves nothing is passed over \
+                     (jobs/README.md has all words); write the move with these";
 
 /// What a line moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
