@@ -288,7 +288,8 @@ impl ByDistance {
         let outlier = self.level.is_known() && surprise.is_far() && !self.unrest.is_great();
         if !outlier {
             let learns = self.unrest.is_calm() || self.level.hardly_knows_exponent();
-            self.level.update(&sight, learns && !pairing.is_doubtful());
+            let tells = self.level.tells_exponent(pairing.ln_speed) && !pairing.is_doubtful();
+            self.level.update(&sight, learns && tells);
         }
         let Some(found) = self.changes.find() else {
             return if outlier { Use::Outlier } else { Use::Taken };

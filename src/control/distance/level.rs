@@ -10,6 +10,9 @@ const EXPONENT_RANGE: (f64, f64) = (0.7, 2.2);
 /// Standard deviation of b above which it is hardly known, as a share of what it was begun
 /// with.
 const HARDLY: f64 = 0.1;
+/// Difference of ln v to what is known best from which a width tells of b: a robot's
+/// reports are not that exact, and what they scatter would pull b towards 0.
+const APART: f64 = 0.015;
 /// Standard deviation that b keeps at an end of its range, as a share of it.
 const AT_END: f64 = 0.3;
 /// Standard deviation that the first width leaves in ln A: it may be an
@@ -109,6 +112,13 @@ impl Level {
     /// Whether little is known yet of b but what it was begun with.
     pub fn hardly_knows_exponent(&self) -> bool {
         self.spread[2] > (HARDLY * self.begun_with).powi(2)
+    }
+
+    /// Whether a width of bead laid at ln(v/v₀) tells of b: its speed lies clearly off the
+    /// one of which the width is known best.
+    pub fn tells_exponent(&self, ln_speed: f64) -> bool {
+        let [_, both, exponent] = self.spread;
+        exponent > 0.0 && (ln_speed - both / exponent).abs() > APART
     }
 
     /// Standard deviation of ln A for the exponent that is believed.

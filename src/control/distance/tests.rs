@@ -260,3 +260,24 @@ fn a_bead_that_is_never_paired_with_a_speed_is_told() {
     line.law.begin_bead();
     assert_eq!(line.law.distrust(), None);
 }
+
+#[test]
+fn a_speed_that_is_not_reported_exactly_teaches_no_exponent() {
+    let mut law = ByDistance::new(settings());
+    let mut path = 0.0;
+    for k in 0..800_u32 {
+        // Half a percent of noise on the reports, milliseconds on their arrival, and widths
+        // that are exact.
+        let [speed, late] = hash::normal_pair(hash::mix(&[7, u64::from(k)]));
+        path += 112.5 * STEP_S;
+        let at = Stamp::from_secs(STEP_S * f64::from(k + 1) + 1e-3 * late.abs().min(5.0));
+        let reported = MmPerS::constant(112.5 * (1.0 + 0.005 * speed));
+        law.reported(at, Mm::constant(path), reported, 1.0);
+        if path > OFFSET + GAUGE {
+            let exact = (Mm::constant(38.61), Mm::constant(0.002));
+            let trace = law.measured(Mm::constant(path), exact, exact.0);
+            assert!((trace.exponent - 0.25).abs() < 0.01, "{k}: {trace:?}");
+            assert!((trace.offset_mm.get() - OFFSET).abs() < 0.05 * OFFSET, "{k}: {trace:?}");
+        }
+    }
+}

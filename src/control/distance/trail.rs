@@ -9,6 +9,14 @@ const MOST: usize = 1 << 16;
 const SLOWEST_MM_PER_S: f64 = 0.5;
 /// Share of the speed within which two reports tell the same speed.
 const SAME_SHARE: f64 = 1e-3;
+/// How far the arrival of reports may lie beside what path and speeds tell \[s\]: within
+/// it the speeds are believed, for a report that is a millisecond late makes several
+/// percent of a speed by the path.
+const LATE_S: f64 = 0.03;
+/// Time within which such a difference is forgotten \[s\].
+const LATE_FOR_S: f64 = 1.0;
+/// Shortest time that a piece can have taken, as a share of that between its reports.
+const LEAST_TIME: f64 = 0.1;
 /// Share of the flow below which there is no bead to speak of.
 const LEAST_FLOW: f64 = 0.01;
 /// A piece shorter than this is none \[mm\].
@@ -20,7 +28,8 @@ const LEAST_SHARE: f64 = 1e-6;
 const USUAL_S: f64 = 3.0;
 
 /// Speeds over path. Between two reports the speed is taken to have gone from
-/// one to the other at once, at the place that the way between them tells.
+/// one to the other at once, at the place that the way between them tells. Where speeds and
+/// path do not belong together, beyond what late reports explain, the path tells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trail {
     reference_mm_per_s: f64,
@@ -29,6 +38,8 @@ pub struct Trail {
     nodes: VecDeque<Node>,
     /// Speed of the newest report \[mm/s\].
     speed: f64,
+    /// Time by which reports have come early, by path and speeds \[s\].
+    early_s: f64,
     flow_share: f64,
     /// Logarithm of the flow's share as it has been of late.
     usual: Option<f64>,
@@ -69,6 +80,7 @@ impl Trail {
             reach_mm,
             nodes: VecDeque::new(),
             speed: 0.0,
+            early_s: 0.0,
             flow_share: 1.0,
             usual: None,
             restless: 0.0,
@@ -78,6 +90,7 @@ impl Trail {
     /// Forgets all.
     pub fn clear(&mut self) {
         self.nodes.clear();
+        self.early_s = 0.0;
     }
 
     /// Whether there is no stretch yet.
@@ -97,7 +110,7 @@ impl Trail {
                 self.extend(&last, (at_s, path_mm), before);
             }
             _ => {
-                self.nodes.clear();
+                self.clear();
                 self.nodes.push_back(Node { path_mm, at_s, sum: 0.0, square: 0.0, changed: 0.0 });
             }
         }
@@ -127,14 +140,23 @@ impl Trail {
         let share = share.clamp(0.0, 1.0);
         let driven = before * share + self.speed * (1.0 - share);
         let first = way * before * share / driven.max(LEAST_MM);
+        let took = self.took(time, way / driven.max(LEAST_MM));
         if first > LEAST_MM && share > LEAST_SHARE {
-            self.push(last.path_mm + first, last.at_s + share * time, first / (share * time));
+            self.push(last.path_mm + first, last.at_s + share * time, first / (share * took));
         }
         if way - first > LEAST_MM && share < 1.0 - LEAST_SHARE {
-            self.push(path_mm, at_s, (way - first) / ((1.0 - share) * time));
+            self.push(path_mm, at_s, (way - first) / ((1.0 - share) * took));
         } else if let Some(node) = self.nodes.back_mut() {
             node.at_s = at_s;
         }
+    }
+
+    /// Time that a way took \[s\], from that between its reports and that by the speeds: the
+    /// latter, as far as reports that came early or late explain the difference.
+    fn took(&mut self, time: f64, by_speed: f64) -> f64 {
+        let early = self.early_s * libm::exp(-time / LATE_FOR_S);
+        self.early_s = (early + by_speed - time).clamp(-LATE_S, LATE_S);
+        (time + self.early_s - early).max(LEAST_TIME * time)
     }
 
     fn push(&mut self, path_mm: f64, at_s: f64, speed: f64) {
@@ -233,6 +255,35 @@ mod tests {
         assert!((half.variance - 0.25 * 0.5_f64.ln().powi(2)).abs() < 1e-9);
         assert!((trail.time_at(103.0).unwrap() - 1.03).abs() < 1e-9);
         assert!((trail.time_at(108.0).unwrap() - 1.13).abs() < 1e-9);
+    }
+
+    #[test]
+    fn reports_that_come_early_or_late_change_no_speed() {
+        let mut trail = Trail::new(100.0, 1e3);
+        for k in 0..400_u32 {
+            // Up to 3 ms late, of 20.
+            let late_s = 1e-3 * f64::from(k * k % 4);
+            let at_s = 0.02 * f64::from(k);
+            trail.report(at_s + late_s, 100.0 * at_s, 100.0, 1.0);
+        }
+        for k in 0..100 {
+            let from = 20.0 + 7.3 * f64::from(k);
+            let seen = trail.over(from, from + 12.7).unwrap();
+            assert!(seen.mean.abs() < 1e-6 && seen.variance < 1e-9, "{from}: {seen:?}");
+        }
+    }
+
+    #[test]
+    fn a_speed_that_the_path_belies_is_not_believed() {
+        // It reports what it was told, and moves at three quarters of it.
+        let mut trail = Trail::new(100.0, 1e3);
+        for k in 0..400_u32 {
+            let at_s = 0.02 * f64::from(k);
+            trail.report(at_s, 75.0 * at_s, 100.0, 1.0);
+        }
+        let seen = trail.over(400.0, 420.0).unwrap();
+        // To the 3 % that reports which came later and later would explain.
+        assert!((seen.mean - 0.75_f64.ln()).abs() < 0.035, "{seen:?}");
     }
 
     #[test]
