@@ -14,6 +14,9 @@ use toml::de::DeTable;
 pub use self::problem::{Problem, Problems};
 pub use self::table::Table;
 
+/// Slips of syntax that are told: one makes many.
+const SLIPS: usize = 3;
+
 /// A parsed file and what was found wrong with it so far.
 pub struct Document<'a> {
     file: &'a str,
@@ -29,9 +32,13 @@ impl<'a> Document<'a> {
     pub fn parse(file: &'a str, text: &'a str, for_run: bool) -> Self {
         let (root, errors) = DeTable::parse_recoverable(text);
         let document = Self { file, text, root, problems: RefCell::default(), for_run };
-        for error in errors {
+        let more = errors.len().saturating_sub(SLIPS);
+        for error in errors.into_iter().take(SLIPS) {
             let line = error.span().map(|span| document.line_of(span.start));
             document.report(line, "", format!("not TOML: {}", error.message()), "");
+        }
+        if more > 0 {
+            document.report(None, "", format!("not TOML: and {more} more, likely of the same"), "");
         }
         document
     }

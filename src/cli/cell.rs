@@ -72,7 +72,8 @@ impl LoadedCell {
                 (Calibration::Scale { mm_per_px: *mm_per_px, sigma: *sigma }, None)
             }
             CalibrationSource::File(file) => {
-                let calibration = calibration_file::read(file)?;
+                let calibration = calibration_file::read(file)
+                    .with_context(|| format!("{}: calibration.file", path.display()))?;
                 let text = fs::read_to_string(file)
                     .with_context(|| format!("calibration file {}", file.display()))?;
                 (calibration, Some(text))
@@ -84,7 +85,7 @@ impl LoadedCell {
     }
 
     /// Refuses a law by distance whose camera looks at bead that is not laid yet.
-    fn check_sight(&self) -> Result<(), WrongArguments> {
+    pub fn check_sight(&self) -> Result<(), WrongArguments> {
         let Some(run) = &self.cell.run else { return Ok(()) };
         let half = self.cell.gauge_length(&self.calibration) * 0.5;
         let offset = run.camera.offset;

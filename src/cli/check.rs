@@ -16,6 +16,11 @@ use crate::extruder::start_stop::Pause;
 use crate::time::Span;
 use crate::units::Mm;
 
+/// Ratio of speeds in one cell that nobody means.
+const UNLIKELY: f64 = 200.0;
+/// Distance of the camera that nobody means.
+const UNLIKELY_NEAR: Mm = Mm::constant(0.5);
+
 /// Validates a cell file and all it refers to.
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
@@ -38,16 +43,12 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     // Everything that the extruder's strategy refers to, before anything is called
     // sound.
     let side = run.as_ref().map_or(Ok(None), LoadedCell::extruder)?;
+    run.as_ref().map_or(Ok(()), LoadedCell::check_sight)?;
+    check_gauge(&loaded)?;
     say!("{}: sound", args.cell.display());
     say!("  calibration  {}", loaded.calibration_words());
     if let Calibration::Full { image_size_px: [width, height], .. } = loaded.calibration {
-        let roi = loaded.cell.gauge.roi;
         say!("  images       {width}x{height} px");
-        if !roi.fits((width as usize, height as usize)) {
-            say!(
-                "  WARNING      gauge.roi_px reaches beyond the calibration's {width}x{height} px"
-            );
-        }
     }
     about_surface(&loaded);
     say!("  suffices for process, render");
@@ -214,6 +215,25 @@ fn about_ahead(side: &ExtruderSide) {
     }
 }
 
+/// Refuses a gauge that reaches beyond the images that were calibrated: no frame could be
+/// measured.
+fn check_gauge(loaded: &LoadedCell) -> Result<(), WrongArguments> {
+    let Calibration::Full { image_size_px: [width, height], .. } = loaded.calibration else {
+        return Ok(());
+    };
+    let roi = loaded.cell.gauge.roi;
+    if roi.fits((width as usize, height as usize)) {
+        return Ok(());
+    }
+    Err(WrongArguments::new(format!(
+        "{}: gauge.roi_px: found columns to {} and rows to {}, expected a gauge within the \
+         {width}x{height} px that were calibrated",
+        loaded.path.display(),
+        roi.x + roi.width,
+        roi.y + roi.height
+    )))
+}
+
 /// Tells what the width is held by, where it is not the PI law.
 fn about_law(loaded: &LoadedCell, run: &RunPart) {
     if let Some(steps) = loaded.cell.steps(run, &loaded.calibration) {
@@ -253,6 +273,14 @@ fn about_run(run: &RunPart) {
         run.robot.start_length.get(),
         run.robot.start_speed
     );
+    let (slowest, fastest) = (run.limits.min_speed, run.limits.max_speed);
+    if fastest > slowest * UNLIKELY {
+        say!("  WARNING      [limits] go from {slowest} to {fastest}: are both mm/s?");
+    }
+    if run.camera.offset < UNLIKELY_NEAR {
+        say!("  WARNING      camera.offset_mm: {} is hardly a nozzle's width;", run.camera.offset);
+        say!("               is it mm?");
+    }
     let delay = run.camera.offset.get() / run.robot.start_speed.get();
     say!("  dead time    {delay:.2} s at that speed, from nozzle to gauge");
 }

@@ -173,4 +173,5 @@ fn tell(offset_mm: f64, sigma_mm: f64, now: Option<Mm>) {
     let places = if sigma_mm < 0.05 { 2 } else { 1 };
     say!("[camera]");
     say!("offset_mm = {offset_mm:.places$}");
+    say!("offset_sigma_mm = {sigma_mm:.places$}");
 }

@@ -74,7 +74,10 @@ pub fn figures(summary: &Summary) {
         say!("target     {target} mm");
     }
     if let (Some(mean), Some(rms)) = (control.width_error_mean_mm, control.width_error_rms_mm) {
-        say!("error      {mean:.3} mm mean, {rms:.3} mm RMS, since control began");
+        say!("error      {mean:.3} mm mean, {rms:.3} mm RMS as measured, since control began");
+    }
+    if let Some(worst) = control.width_error_worst {
+        say!("worst      {:+.3} mm, at {:.0} mm of the path", worst.error_mm, worst.bead_path_mm);
     }
     if let Some(settled) = control.width_error_rms_settled_mm {
         say!("settled    {settled:.3} mm RMS, from 500 mm after that");
@@ -125,7 +128,7 @@ pub fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
         }
         _ if faults > 0 => {
             let times = if faults == 1 { "once".to_owned() } else { format!("{faults} times") };
-            tell!("error: the controller gave up {times}; the report says why");
+            tell!("error: the controller gave up {times}; the run's report says why");
             return ExitCode::FAILURE;
         }
         _ if report.pump_runs => {
@@ -141,9 +144,16 @@ pub fn status(report: &LiveReport, max_rejected_share: f64) -> ExitCode {
     if control.is_some_and(|control| !control.states_s.keys().any(at_work))
         && report.ending != Ending::Asked
     {
-        tell!(
-            "warning: the robot never printed, so that nothing was controlled; start its program"
-        );
+        let connected = control.is_some_and(|control| control.was_connected);
+        let why = match report.ending {
+            Ending::LastFrame => "the camera's frames ended before the robot printed",
+            _ if !connected => {
+                "no robot was heard; see that it listens where [robot] address says. Nothing was \
+                 laid"
+            }
+            _ => "the robot never printed; start its program. Nothing was laid",
+        };
+        tell!("warning: {why}, and nothing was controlled");
         return ExitCode::from(WITH_LOSS);
     }
     // A run that somebody ends early may have seen little more than the bead's

@@ -106,6 +106,10 @@ pub fn run(args: &TuneArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     if !voice.quiet {
         tell!("looking at {}: this takes some seconds", recording.display());
     }
+    let run = args.out.join("run/report.html");
+    if args.recording.is_none() && run.exists() && !voice.quiet {
+        tell!("report of the run: {}", run.display());
+    }
     let tuned = analyse::tuned(&recording, &loaded, farthest)?;
     output::make_folder(&args.out)?;
     output::write_whole(&args.out, "tune.json", tuned.json().as_bytes())?;

@@ -135,17 +135,34 @@ fn share_sentence(summary: &Summary, max_rejected_share: f64) -> String {
 }
 
 /// An error that nobody asked for: more than a twentieth of the target once
-/// settled, or a limit that acted for a tenth of the run.
+/// settled or in all, or a limit that acted for a tenth of the run.
 fn far_off(control: &ControlSummary, summary: &Summary) -> Option<String> {
     let (error, target) = (control.width_error_rms_settled_mm?, summary.target_width_mm?);
     let share = control.limited_s / summary.duration_s.unwrap_or(f64::INFINITY);
     if error > FAR_OFF * target && !is_excited(summary) {
         Some(format!("That is {:.0} % of the target.", 100.0 * error / target))
+    } else if let Some(sentence) = far_off_before(control, target).filter(|_| !is_excited(summary))
+    {
+        Some(sentence)
     } else if share > LONG_LIMITED {
         Some(format!("The robot stood at a limit for {:.0} % of the time.", 100.0 * share))
     } else {
         None
     }
+}
+
+/// An error over all bead laid under control, as at a corner within what counts as settling.
+fn far_off_before(control: &ControlSummary, target: f64) -> Option<String> {
+    let (rms, worst) = (control.width_error_rms_mm?, control.width_error_worst?);
+    (rms > FAR_OFF * target).then(|| {
+        format!(
+            "Over all bead laid under control the error is {rms:.2} mm RMS, {:.0} % of the target; \
+             at worst {:+.2} mm, at {:.0} mm of the path.",
+            100.0 * rms / target,
+            worst.error_mm,
+            worst.bead_path_mm
+        )
+    })
 }
 
 /// What the extruder side did that one should know; nothing where it did well.

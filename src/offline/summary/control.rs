@@ -26,6 +26,9 @@ pub struct ControlSummary {
     pub width_error_rms_mm: Option<f64>,
     /// Root mean square over bead laid more than 500 mm after that.
     pub width_error_rms_settled_mm: Option<f64>,
+    /// The largest error of the bead laid after control began, with its sign, and where on
+    /// the robot's path that bead lies.
+    pub width_error_worst: Option<Worst>,
     /// Setpoints that were written to the robot.
     pub setpoints_sent: u64,
     /// Time during which a limit shaped the speed.
@@ -54,8 +57,19 @@ pub struct ControlSummary {
     pub frames_dropped_by_recorder: u64,
     /// Events or steps that could not be recorded.
     pub records_lost: u64,
+    /// Whether the link to the robot was ever up.
+    pub was_connected: bool,
     /// How often the link came up again after it had been up.
     pub link_reconnects: u64,
+}
+
+/// A width that is further off than all others.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Worst {
+    /// Measured less wanted \[mm\].
+    pub error_mm: f64,
+    /// Robot's path of the bead that it shows \[mm\].
+    pub bead_path_mm: f64,
 }
 
 /// Median, 99 % quantile and maximum; null of nothing.
@@ -87,6 +101,7 @@ pub struct ControlTally {
     error: Moments,
     error_size: Moments,
     error_settled: Moments,
+    worst: Option<Worst>,
     limited_by: Times,
     held_for: Times,
     states: Times,
@@ -125,6 +140,9 @@ impl ControlTally {
         let error = measured.width - target;
         self.error.add(error.get());
         self.error_size.add(error.get().abs());
+        if self.worst.is_none_or(|worst| error.get().abs() > worst.error_mm.abs()) {
+            self.worst = Some(Worst { error_mm: error.get(), bead_path_mm: bead.get() });
+        }
         if bead > began + SETTLED_AFTER {
             self.error_settled.add(error.get());
         }
@@ -178,6 +196,7 @@ impl ControlTally {
             width_error_mean_mm: self.error_size.mean(),
             width_error_rms_mm: self.error.rms(),
             width_error_rms_settled_mm: self.error_settled.rms(),
+            width_error_worst: self.worst,
             setpoints_sent: self.setpoints,
             limited_s: total(&self.limited_by),
             limited_by_s: seconds(&self.limited_by),
@@ -191,6 +210,7 @@ impl ControlTally {
             frames_superseded: self.superseded,
             frames_dropped_by_recorder: self.dropped,
             records_lost: self.records_lost,
+            was_connected: self.links > 0,
             link_reconnects: self.links.saturating_sub(1),
         }
     }

@@ -90,6 +90,8 @@ fn only_bead_laid_under_control_counts_for_the_error() {
     assert!((control.width_error_mean_mm.unwrap() - 4.5 / 4.0).abs() < 1e-12);
     let rms = ((9.0 + 1.0 + 0.25) / 4.0_f64).sqrt();
     assert!((control.width_error_rms_mm.unwrap() - rms).abs() < 1e-12);
+    let worst = control.width_error_worst.unwrap();
+    assert_eq!((worst.error_mm, worst.bead_path_mm), (3.0, 200.0));
     let settled = (0.25 / 2.0_f64).sqrt();
     assert!((control.width_error_rms_settled_mm.unwrap() - settled).abs() < 1e-12);
 }
