@@ -84,6 +84,7 @@ impl LaidBead {
         let width = self.model.width_at(speed_mm_per_s) * self.pulse;
         let Self { flow, waviness, wander, step_mm, strips, .. } = self;
         let Some(strip) = strips.last_mut() else { return };
+        strip.take_back(*step_mm);
         strip.end_mm = to_mm;
         while strip.next_number() <= last {
             #[expect(clippy::cast_precision_loss, reason = "node numbers stay below 2^53")]
@@ -160,6 +161,15 @@ impl Strip {
         self.first + i64::try_from(self.nodes.len()).unwrap_or(i64::MAX - self.first.max(0))
     }
 
+    /// Takes back a node beyond the end, which stood for bead that is laid only now.
+    fn take_back(&mut self, step_mm: f64) {
+        #[expect(clippy::cast_precision_loss, reason = "node numbers stay below 2^53")]
+        let last_mm = (self.next_number() - 1) as f64 * step_mm;
+        if last_mm > self.end_mm {
+            self.nodes.pop();
+        }
+    }
+
     /// Adds a node; a bead is never narrower than nothing.
     fn push(&mut self, left_mm: f64, right_mm: f64, step_mm: f64) {
         let right_mm = right_mm.max(left_mm);
@@ -194,6 +204,28 @@ impl Strip {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_bead_changes_where_the_speed_does_however_short_the_pieces() {
+        for piece_mm in [0.05, 0.4, 2.0] {
+            let mut bead = LaidBead::new(BeadModel::fitted_2022(), SMOOTH, STEADY, 1);
+            let model = BeadModel::fitted_2022();
+            let speed = |at: f64| 80.0 + 0.4 * at;
+            let mut at = 0.0;
+            while at < 100.0 {
+                bead.lay_ramp((at, at + piece_mm), (speed(at), speed(at + piece_mm)));
+                at += piece_mm;
+            }
+            for place in [10.3, 47.77, 80.0] {
+                // 0.4 mm/s a millimetre: the place at which that width belongs.
+                let width = bead.width_at(place).unwrap();
+                let slope = model.width_at(speed(place + 1.0)) - model.width_at(speed(place));
+                let off_mm = (width - model.width_at(speed(place))) / slope;
+                assert!(off_mm.abs() < 0.55, "{piece_mm}: {off_mm} at {place}");
+                assert!(piece_mm > 1.0 || off_mm.abs() < 0.26, "{piece_mm}: {off_mm} at {place}");
+            }
+        }
+    }
 
     const STEADY: Flow = Flow::STEADY;
     const SMOOTH: Roughness = Roughness { size_mm: 0.0, length_mm: 5.0 };
