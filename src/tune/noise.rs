@@ -86,14 +86,32 @@ fn drift(pieces: &[Seen]) -> Drift {
     let each: Vec<Likely> = tried.map(|ratio| Likely::of(pieces, ratio)).collect();
     let none = Likely::of(pieces, 0.0);
     let best = each.iter().copied().fold(none, |a, b| if b.ln > a.ln { b } else { a });
-    let within = |drop: f64| each.iter().filter(move |one| one.ln > best.ln - drop);
-    let most = |drop: f64| within(drop).map(|one| one.per_root_m).fold(0.0, f64::max);
     if none.ln > best.ln - NINETY_FIVE {
-        return Drift::AtMost(most(NINETY_FIVE));
+        return Drift::AtMost(ends(&each, best.ln - NINETY_FIVE).1);
     }
-    let low = within(ONE_SIGMA).map(|one| one.per_root_m).fold(f64::INFINITY, f64::min);
+    let (low, high) = ends(&each, best.ln - ONE_SIGMA);
     let per_root_m = best.per_root_m;
-    Drift::Found { per_root_m, low: low.min(per_root_m), high: most(ONE_SIGMA).max(per_root_m) }
+    Drift::Found { per_root_m, low: low.min(per_root_m), high: high.max(per_root_m) }
+}
+
+/// Sizes of the walk between which it is likelier than a limit, on the line between two
+/// that were tried.
+fn ends(each: &[Likely], limit: f64) -> (f64, f64) {
+    let is_within = |one: &Likely| one.ln > limit;
+    let cross = |inside: &Likely, outside: Option<&Likely>| match outside {
+        Some(outside) => {
+            let share = (inside.ln - limit) / (inside.ln - outside.ln);
+            inside.per_root_m + share * (outside.per_root_m - inside.per_root_m)
+        }
+        None => inside.per_root_m,
+    };
+    let end = |at: Option<usize>, beyond: &dyn Fn(usize) -> Option<usize>| {
+        let inside = at.and_then(|at| each.get(at).zip(Some(beyond(at))));
+        inside.map(|(one, beyond)| cross(one, beyond.and_then(|at| each.get(at))))
+    };
+    let low = end(each.iter().position(is_within), &|at| at.checked_sub(1));
+    let high = end(each.iter().rposition(is_within), &|at| Some(at + 1));
+    (low.unwrap_or(f64::INFINITY), high.unwrap_or(0.0))
 }
 
 /// A size of the walk and how likely it is.

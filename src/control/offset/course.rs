@@ -18,6 +18,9 @@ const LONGEST_MM: f64 = 1e7;
 /// Share of the usual speed below which a bead is at its beginning or its end, where its
 /// width is no power of the speed.
 const SLOWEST: f64 = 0.2;
+/// Growth of the speed over a millimetre, as a share, beyond which a bead that begins is
+/// still run up, or one that ends run out: there, too, its width is something else.
+const RUN_UP_PER_MM: f64 = 0.01;
 
 /// All beads of a recording.
 #[derive(Debug, Clone)]
@@ -34,7 +37,8 @@ struct Bead {
     clocks: Vec<f64>,
     paths: Vec<f64>,
     speeds: Vec<f64>,
-    /// Nodes of the grid up to each, at which the bead was laid slower than the slowest.
+    /// Nodes of the grid up to each, at which the bead was laid slower than the slowest, or
+    /// was run up or out.
     slow: Vec<u32>,
 }
 
@@ -197,8 +201,11 @@ impl Bead {
     }
 
     fn mark_slow(&mut self, slowest: f64) {
-        let slow = self.on_grid().scan(0, |count, speed| {
-            *count += u32::from(speed < slowest);
+        let speeds: Vec<f64> = self.on_grid().collect();
+        let from = run_up(speeds.iter(), slowest);
+        let to = speeds.len() - run_up(speeds.iter().rev(), slowest);
+        let slow = speeds.iter().enumerate().scan(0, |count, (node, speed)| {
+            *count += u32::from(*speed < slowest || node < from || node >= to);
             Some(*count)
         });
         self.slow = slow.collect();
@@ -209,7 +216,10 @@ impl Bead {
         if from < 0.0 || to > self.length_mm() {
             return false;
         }
-        self.slow.get(number(from / STEP_MM)) == self.slow.get(number(to / STEP_MM))
+        // Both nodes about either end count: a gauge may be as short as a point.
+        let before = number(from / STEP_MM).checked_sub(1).and_then(|node| self.slow.get(node));
+        let after = self.slow.get(number(to / STEP_MM) + 1).or(self.slow.last());
+        before.copied().unwrap_or(0) == after.copied().unwrap_or(0)
     }
 
     fn sums(&self, exponent: f64, slowest: f64) -> Sums {
@@ -225,6 +235,13 @@ impl Bead {
         let ends = (end(powers.first()), end(powers.last()));
         Sums { start_mm: self.start_mm(), exponent, to_nodes, ends }
     }
+}
+
+/// Nodes from a bead's end inwards over which the speed still grows fast.
+fn run_up<'a>(speeds: impl Iterator<Item = &'a f64> + Clone, slowest: f64) -> usize {
+    let grows = |here: f64, next: f64| next > here * (1.0 + RUN_UP_PER_MM * STEP_MM);
+    let pairs = speeds.clone().zip(speeds.skip(1));
+    pairs.take_while(|(here, next)| **here < slowest || grows(**here, **next)).count()
 }
 
 impl Sums {
