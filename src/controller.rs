@@ -2,7 +2,7 @@
 //! nothing; live, simulated and replayed cells run this same code.
 //!
 //! - idle: the robot is not printing.
-//! - priming: first stretch of a bead, at the start speed.
+//! - priming: first stretch of a bead, at the start speed, until a width of it is due.
 //! - tracking: the width is held by distance, or by the PI law, once a width of
 //!   this bead has been seen; or the speed goes through a course of steps.
 //! - holding: the speed stays as it is, for a reason, but for what a plan, a start or
@@ -142,6 +142,17 @@ enum Stretch {
     Ending,
 }
 
+/// What was heard of the robot, on whatever connection.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Heard {
+    /// The path in its last report.
+    path: Option<Mm>,
+    /// Whether the path has fallen since the bead began: another one is being laid.
+    is_another: bool,
+    /// Since when nobody has heard it, whatever else was the matter before.
+    not_since: Option<Stamp>,
+}
+
 /// The controller of a cell: the width by the robot's speed and, where the
 /// cell says so, the flow by the extruder.
 #[derive(Debug, Clone, PartialEq)]
@@ -152,9 +163,10 @@ pub struct Controller {
     /// A hold that only a new run ends.
     ended: bool,
     link_up: bool,
+    /// No more frames come.
+    camera_lost: bool,
     robot: Option<RobotState>,
-    /// The path in the last report, on whatever connection.
-    path: Option<Mm>,
+    heard: Heard,
     transport: Transport,
     odometer: Odometer,
     /// The law by distance, where the cell asks for it.
@@ -190,8 +202,9 @@ impl Controller {
             phase: Phase::Idle,
             ended: false,
             link_up: false,
+            camera_lost: false,
             robot: None,
-            path: None,
+            heard: Heard::default(),
             transport: Transport::default(),
             odometer: Odometer::default(),
             distance,
@@ -212,7 +225,8 @@ impl Controller {
     /// The same with an extruder that is commanded.
     pub fn with_extruder(mut self, setup: ExtruderSetup, demand: FlowDemand) -> Self {
         let plan = setup.plan.clone();
-        self.extruder = Some(ExtruderSide { supervisor: Supervisor::new(setup), demand, plan });
+        self.extruder =
+            Some(ExtruderSide { supervisor: Supervisor::new(setup), demand, plan, planned: None });
         self
     }
 
@@ -255,6 +269,7 @@ impl Controller {
             Event::LinkDown { .. } => {
                 self.link_up = false;
                 self.robot = None;
+                self.heard.not_since = self.heard.not_since.or(Some(now));
                 self.follow.reset();
                 self.hold_if_printing(now, Hold::LinkDown);
                 None
@@ -267,6 +282,7 @@ impl Controller {
             | Event::ExtruderTick => None,
             Event::Tick => self.tick(now, &mut trace),
             Event::CameraLost { .. } => {
+                self.camera_lost = true;
                 self.hold_if_printing(now, Hold::CameraLost);
                 None
             }
@@ -332,8 +348,13 @@ impl Controller {
         Some(Command::Speed(limited.speed))
     }
 
-    /// Holds when widths stay out, and gives up when a hold lasts too long.
+    /// Holds when widths stay out, also those that the first stretch waits for, and gives up
+    /// when a hold lasts too long.
     fn lose_patience(&mut self, now: Stamp) {
+        let is_due = self.nozzle(now).is_some_and(|path| path > self.widths_due());
+        if self.phase == Phase::Priming && is_due {
+            self.phase = Phase::Holding { since: now, why: Hold::NoWidth };
+        }
         let (max_gap, max_hold) = (self.setup.control.max_gap, self.setup.control.max_hold);
         match &self.phase {
             Phase::Tracking { seen_at, .. } if now - *seen_at > max_gap => {
@@ -344,6 +365,14 @@ impl Controller {
             }
             _ => {}
         }
+    }
+
+    /// Where the nozzle is when a width of this bead has long been due: twice as far as the
+    /// camera is behind, or once more behind the first stretch, and what the cell bears
+    /// without one.
+    fn widths_due(&self) -> Mm {
+        let Setup { start_length, camera_offset, start_speed, control, .. } = &self.setup;
+        start_length.max(*camera_offset) + *camera_offset + *start_speed * control.max_gap
     }
 
     /// Holds a bead that is being laid; a first reason stays.

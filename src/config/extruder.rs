@@ -151,6 +151,13 @@ impl Extruder {
             let expected = "strategy = \"feedforward\", with the model that was planned with";
             table.report("plan", "the plan of a job", expected);
         }
+        if starts.is_some()
+            && strategy.as_ref().is_some_and(|known| !known.stands_while_the_flow_comes())
+        {
+            let expected = "strategy = \"constant\" or \"feedforward\": while the flow of a start \
+                            comes the strategy stands at its first command";
+            table.report("starts", "how the extruder starts and stops", expected);
+        }
         let link = link::read(table, rates.map(|rates| rates.io_hz));
         Some(Self {
             drive: drive?,

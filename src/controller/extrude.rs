@@ -4,9 +4,9 @@
 use std::sync::Arc;
 
 use super::{Controller, Phase, Stretch};
-use crate::control::{Event, ExtruderStep, Hold};
+use crate::control::{Event, ExtruderStep};
 use crate::extruder::{ExtruderFault, ExtruderState, FlowDemand, Laying, Supervisor};
-use crate::plan::PlannedJob;
+use crate::plan::{Planned, PlannedJob};
 use crate::time::Stamp;
 
 /// The extruder side of a controller, where a cell has one.
@@ -16,17 +16,23 @@ pub(super) struct ExtruderSide {
     pub(super) demand: FlowDemand,
     /// The job that was planned, if there is one.
     pub(super) plan: Option<Arc<PlannedJob>>,
+    /// What was planned for the last place on this bead that was known.
+    pub(super) planned: Option<Planned>,
 }
 
 impl Controller {
     /// The extruder side's answer to what concerns it.
     pub(super) fn extrude(&mut self, now: Stamp, event: &Event) -> Option<ExtruderStep> {
+        let planned = self.planned(now);
+        if let Some(side) = &mut self.extruder {
+            side.planned = planned.or(side.planned);
+        }
         let laying = self.laying(now);
         if matches!(laying, Laying::Ending(_)) {
             self.stretch = Stretch::Ending;
         }
-        let planned = self.planned(now).map(|planned| planned.command);
-        let ExtruderSide { supervisor, .. } = self.extruder.as_mut()?;
+        let ExtruderSide { supervisor, planned, .. } = self.extruder.as_mut()?;
+        let planned = planned.map(|planned| planned.command);
         let command = match event {
             Event::Extruder(report) => {
                 supervisor.reported(now, report);
@@ -52,7 +58,7 @@ impl Controller {
 
     /// What the extruder side has to know of the robot's.
     fn laying(&self, now: Stamp) -> Laying {
-        let Some(ExtruderSide { demand, supervisor, .. }) = &self.extruder else {
+        let Some(ExtruderSide { demand, supervisor, planned, .. }) = &self.extruder else {
             return Laying::Idle;
         };
         match &self.phase {
@@ -61,9 +67,7 @@ impl Controller {
             _ if self.ended => Laying::Stopped,
             // Nobody knows what a robot does that is not heard, but by then it has
             // stopped.
-            Phase::Holding { why: Hold::LinkDown, since }
-                if now - *since > self.setup.alone_for =>
-            {
+            _ if self.heard.not_since.is_some_and(|since| now - since > self.setup.alone_for) => {
                 Laying::Stopped
             }
             Phase::Priming | Phase::Tracking { .. } | Phase::Holding { .. } => {
@@ -73,8 +77,7 @@ impl Controller {
                 let goes_ahead = self.stretch == Stretch::RunUp || supervisor.is_passing();
                 let robot = self.robot.filter(|_| !goes_ahead);
                 let robot = robot.map(|robot| (told, robot.speed_mm_per_s));
-                let flow =
-                    self.planned(now).map_or_else(|| demand.wanted(robot), |planned| planned.flow);
+                let flow = planned.map_or_else(|| demand.wanted(robot), |planned| planned.flow);
                 let way = supervisor.way_of_stop(told);
                 let stops = self.stretch == Stretch::Ending
                     || self.left(now).zip(way).is_some_and(|(left, way)| left <= way);

@@ -27,6 +27,9 @@ impl Controller {
             self.beads += 1;
         }
         self.laid = Mm::ZERO;
+        if let Some(side) = &mut self.extruder {
+            side.planned = None;
+        }
     }
 
     /// What is planned for where the nozzle is now.

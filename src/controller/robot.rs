@@ -8,13 +8,20 @@ use crate::units::Mm;
 
 /// Share of the setpoint at which a robot that starts has run up.
 const RUN_UP: f64 = 0.95;
+/// Way that a bead may have by the first report of it.
+const BEGUN: Mm = Mm::constant(50.0);
+/// A path that falls by less is that of the same bead.
+const FALL_BACK: Mm = Mm::constant(1.0);
 
 impl Controller {
     pub(super) fn reported(&mut self, now: Stamp, state: &RobotState) {
         let state = &self.odometer.correct(now, state);
         self.transport.observe(now, state);
         self.robot = Some(*state);
-        let before = self.path.replace(state.path_mm);
+        self.heard.not_since = None;
+        // Also where the bead before ended while nobody heard the robot.
+        let before = self.heard.path.replace(state.path_mm);
+        self.heard.is_another |= before.is_some_and(|last| state.path_mm < last - FALL_BACK);
         if self.ended {
             return;
         }
@@ -32,6 +39,7 @@ impl Controller {
 
     fn become_idle(&mut self) {
         self.phase = Phase::Idle;
+        self.heard.is_another = false;
         self.stretch = Stretch::RunUp;
         self.told = None;
         self.asked = None;
@@ -48,15 +56,17 @@ impl Controller {
     }
 
     fn printing(&mut self, now: Stamp, state: &RobotState, before: Option<Mm>) {
-        // Also where the bead before ended while nobody heard the robot.
-        let fresh = before.is_some_and(|last| state.path_mm < last);
         // The extruder's law goes on over a new bead whose robot was not seen
-        // idle: its pump never stood, and what the law knows of it still holds.
-        if fresh {
+        // idle: its pump never stood, and what the law knows of it still holds. A fault
+        // stays until the robot is idle.
+        if self.heard.is_another && !matches!(self.phase, Phase::Fault { .. }) {
             self.become_idle();
         }
         if self.phase == Phase::Idle {
-            self.bead_start = state.path_mm;
+            // It began where the robot was last heard standing, a little before this.
+            let stood =
+                before.filter(|path| state.path_mm - *path < BEGUN && state.path_mm >= *path);
+            self.bead_start = stood.unwrap_or(state.path_mm);
             self.phase = Phase::Priming;
             self.fallback = None;
             self.next_bead();
@@ -99,7 +109,9 @@ impl Controller {
 
     /// The reason for a hold has gone: prime on, or wait for a width.
     fn resume(&mut self, now: Stamp, state: &RobotState) {
-        self.phase = if state.path_mm - self.bead_start < self.setup.start_length {
+        self.phase = if self.camera_lost {
+            Phase::Holding { since: now, why: Hold::CameraLost }
+        } else if state.path_mm - self.bead_start < self.setup.start_length {
             Phase::Priming
         } else {
             Phase::Holding { since: now, why: Hold::NoWidth }

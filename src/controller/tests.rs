@@ -260,3 +260,52 @@ fn a_width_of_the_last_bead_does_not_start_control_of_this_one() {
     let _ = line.robot(RobotMode::Print, 600.0, 112.5);
     assert_eq!(line.width(42.0).state, State::Tracking);
 }
+
+#[test]
+fn a_bead_of_which_no_width_comes_is_held_and_given_up() {
+    let mut line = Line::new();
+    let _ = line.robot(RobotMode::Print, 0.0, 112.5);
+    let mut states = Vec::new();
+    let mut path = 0.0;
+    for _ in 0..80 {
+        path += 11.25;
+        let _ = line.advance(0.1, path, 112.5);
+        let _ = line.tick();
+        states.push((path, line.controller.state()));
+    }
+    let first = |state: &State| states.iter().find(|(_, found)| found == state).map(|one| one.0);
+    let held = first(&State::Holding(Hold::NoWidth)).unwrap();
+    // 200 mm at the start speed, 88.4 mm to the camera, and half a second.
+    assert!((340.0..370.0).contains(&held), "{held}");
+    assert!(first(&State::Fault(Fault::HeldTooLong(Hold::NoWidth))).is_some());
+}
+
+#[test]
+fn a_camera_that_was_lost_while_the_robot_held_is_not_forgotten() {
+    let mut line = Line::new();
+    let _ = line.robot(RobotMode::Print, 0.0, 112.5);
+    let _ = line.advance(0.5, 56.0, 112.5);
+    let _ = line.robot(RobotMode::Hold, 56.0, 0.0);
+    let _ = line.give(&Event::CameraLost { reason: "unplugged".into() });
+    let state = line.advance(0.1, 57.0, 112.5).state;
+    assert_eq!(state, State::Holding(Hold::CameraLost));
+}
+
+#[test]
+fn a_path_that_jitters_is_no_new_bead_and_one_in_a_fault_stays_in_it() {
+    let mut line = Line::tracking();
+    assert_eq!(line.advance(0.1, 236.0, 112.5).state, State::Tracking);
+    assert_eq!(line.advance(0.1, 235.9, 112.5).state, State::Tracking);
+    let _ = line.robot(RobotMode::Fault, 240.0, 0.0);
+    assert_eq!(line.advance(0.1, 5.0, 112.5).state, State::Fault(Fault::Robot));
+    let _ = line.robot(RobotMode::Idle, 5.0, 0.0);
+    assert_eq!(line.advance(0.1, 6.0, 112.5).state, State::Priming);
+}
+
+#[test]
+fn a_new_bead_that_is_first_heard_in_hold_is_a_new_one() {
+    let mut line = Line::tracking();
+    let _ = line.advance(0.1, 500.0, 112.5);
+    let _ = line.robot(RobotMode::Hold, 60.0, 0.0);
+    assert_eq!(line.advance(0.1, 65.0, 112.5).state, State::Priming);
+}

@@ -77,7 +77,8 @@ impl Controller {
 
     /// Where the nozzle was when a frame was captured, and where the bead in
     /// it had been laid.
-    pub(super) fn place(&self, captured_at: Stamp, trace: &mut Trace) {
+    pub(super) fn place(&mut self, captured_at: Stamp, trace: &mut Trace) {
+        self.camera_lost = false;
         trace.captured_at = Some(captured_at);
         trace.nozzle_path_mm = self.transport.path_at(captured_at);
         trace.bead_path_mm = trace.nozzle_path_mm.map(|path| path - self.setup.camera_offset);

@@ -198,7 +198,7 @@ impl Supervisor {
     /// The flow at the nozzle over the one that is wanted, by which the bead that is
     /// laid is wider than the speed alone tells; 1 where nothing is known of it.
     pub fn flow_share(&self) -> f64 {
-        self.shares.map_or_else(|| self.foretold_share(), |shares| shares.flow)
+        self.shares.map_or_else(|| self.foretold().unwrap_or(1.0), |shares| shares.flow)
     }
 
     /// Whether a start or a stop is on its way, by which the robot goes.
@@ -219,17 +219,20 @@ impl Supervisor {
     }
 
     fn foretold_share(&self) -> f64 {
-        // The plan has foreseen how robot and flow go together.
-        if self.setup.law.strategy().is_on_plan() {
-            return 1.0;
+        match self.setup.robot_follows {
+            RobotFollows::Flow => self.foretold().unwrap_or(1.0),
+            RobotFollows::Nothing => 1.0,
         }
+    }
+
+    /// The flow that is foretold over the one that is wanted, where one is and no plan has
+    /// foreseen how robot and flow go together.
+    fn foretold(&self) -> Option<f64> {
         let wanted = self.trace.flow_mm3_per_s;
-        match (self.setup.robot_follows, self.trace.foretold_mm3_per_s) {
-            (RobotFollows::Flow, Some(foretold)) if wanted > Mm3PerS::ZERO => {
-                (foretold / wanted).clamp(0.0, MOST_SHARE)
-            }
-            _ => 1.0,
+        if self.setup.law.strategy().is_on_plan() || wanted <= Mm3PerS::ZERO {
+            return None;
         }
+        self.trace.foretold_mm3_per_s.map(|foretold| (foretold / wanted).clamp(0.0, MOST_SHARE))
     }
 
     /// The link to the extruder came up.

@@ -232,6 +232,7 @@ mod tests {
             ("G1 X10", ["line 1", "feed"]),
             ("G1 F600 X1\nG5 X3", ["line 2", "G5"]),
             ("G1 F600 X1\nG28", ["line 2", "G28"]),
+            ("G92\nG1 F600 X1", ["line 1", "G92"]),
             ("G2 X2 F600", ["line 1", "I and J"]),
             ("G2 X2 I5 J0 F600", ["line 1", "5.000"]),
             ("G2 X9 R1 F600", ["line 1", "9.000"]),

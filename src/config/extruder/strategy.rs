@@ -37,6 +37,14 @@ pub enum Strategy {
     Adaptive(Box<(AdaptiveLaw, NozzleModel)>),
 }
 
+impl Strategy {
+    /// Whether its first command is that of a steady flow, at which it can stand while the
+    /// flow of a start comes up.
+    pub const fn stands_while_the_flow_comes(&self) -> bool {
+        matches!(self, Self::Constant { .. } | Self::Feedforward(_))
+    }
+}
+
 /// How a model is found and inverted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FeedforwardKeys {

@@ -303,3 +303,33 @@ fn a_bead_that_begins_while_the_link_is_down_is_the_next_of_the_plan() {
     // The second bead's plan slows down nowhere.
     assert!((cell.line.tick().unwrap() - SPEED).abs() < 1e-3);
 }
+
+#[test]
+fn a_pump_goes_by_when_the_robot_was_last_heard_whatever_was_held_before() {
+    // Held for a lost camera when the link goes, and for want of widths long before it.
+    for lost_before in [Some(Event::CameraLost { reason: "unplugged".into() }), None] {
+        let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+        cell.mode = RobotMode::Print;
+        assert_eq!(cell.go(2.0), ExtruderState::Running);
+        let _ = cell.line.width(42.0);
+        if let Some(lost) = &lost_before {
+            let _ = cell.line.give(lost);
+        }
+        let _ = cell.line.tick();
+        let _ = cell.go(2.0);
+        let _ = cell.line.tick();
+        assert!(matches!(cell.line.controller.state(), State::Holding(_)));
+        let _ = cell.line.give(&Event::LinkDown { reason: "no STATE for 500 ms".into() });
+        let gone = cell.line.now;
+        while cell.line.now < gone + 1.7 {
+            let report = cell.report();
+            let _ = cell.line.give(&Event::Extruder(report));
+            let side = cell.line.give(&Event::ExtruderTick).extruder.unwrap();
+            cell.told = side.command.or(cell.told);
+            let alone_s = cell.line.now - gone;
+            assert!(cell.last().pump_on || alone_s > 1.55, "{lost_before:?}: {alone_s}");
+            cell.line.now += TICK_S;
+        }
+        assert!(!cell.last().pump_on, "{lost_before:?}");
+    }
+}

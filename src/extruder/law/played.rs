@@ -31,7 +31,7 @@ impl Strategy for Constant {
     fn settle(&mut self, _now: Stamp, _applied: f64) {}
 }
 
-/// A profile that is played from the moment on which the pump runs.
+/// A profile that is played from the moment on which the pump runs; it stands in a hold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Played {
     profile: Profile,

@@ -58,6 +58,14 @@ impl Supervisor {
         let Some(pauses) = &mut self.pauses else { return };
         pauses.want(flow);
         let rises = pauses.shares(now);
+        // A pump that is late with its start is waited for, whatever the clock says.
+        if rises.is_none() && matches!(self.phase, Phase::Starting { .. }) {
+            self.shares = Some(pauses.waiting());
+            return;
+        }
+        if self.phase == Phase::Running && rises.is_none_or(|rises| rises.flow > 0.0) {
+            pauses.flows();
+        }
         if rises.is_none() && self.shares.is_some() {
             self.setup.law.strategy_mut().flows(now, self.applied);
         }

@@ -34,13 +34,21 @@ pub(super) struct Pauses {
     stood: Option<(Stamp, Mm3PerS)>,
     /// The flow that was wanted last.
     wanted: Mm3PerS,
+    /// Whether anything has flowed since the pump was told to run.
+    has_flowed: bool,
     passing: Passing,
 }
 
 impl Pauses {
     /// Before the first bead.
     pub(super) const fn new(timing: Timing) -> Self {
-        Self { timing, stood: None, wanted: Mm3PerS::ZERO, passing: Passing::Even }
+        Self {
+            timing,
+            stood: None,
+            wanted: Mm3PerS::ZERO,
+            has_flowed: false,
+            passing: Passing::Even,
+        }
     }
 
     /// A bead begins.
@@ -67,9 +75,14 @@ impl Pauses {
     pub(super) fn turned(&mut self, now: Stamp, on: bool) {
         if on {
             self.begin(now);
-        } else {
+        } else if std::mem::take(&mut self.has_flowed) {
             self.stood = Some((now, self.wanted));
         }
+    }
+
+    /// Something flows by now: the pause is over.
+    pub(super) const fn flows(&mut self) {
+        self.has_flowed = true;
     }
 
     /// The bead is over.
@@ -80,6 +93,11 @@ impl Pauses {
     /// How far from the end of a bead that is laid at this speed the pump stops.
     pub(super) fn way(&self, speed: MmPerS) -> Mm {
         self.timing.stop().way() * (speed / self.timing.laid().speed)
+    }
+
+    /// What a robot and a flow are that wait for the pump.
+    pub(super) fn waiting(&self) -> Shares {
+        Shares { robot: self.timing.laid().least_share, flow: 0.0 }
     }
 
     /// What the start or the stop makes of this moment; none while the flow is even.

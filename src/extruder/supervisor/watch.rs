@@ -91,6 +91,10 @@ impl Supervisor {
         if matches!(self.phase, Phase::Running | Phase::Holding { .. }) {
             self.phase = Phase::Starting { since };
             self.follow.reset();
+            // Its flow comes up once more, unless it was still on its way.
+            if let Some(pauses) = self.pauses.as_mut().filter(|_| self.shares.is_none()) {
+                pauses.begin(now);
+            }
             self.stand(now, self.trace.flow_mm3_per_s);
         }
     }

@@ -98,7 +98,8 @@ impl State {
             90.0 => self.relative = false,
             91.0 => self.relative = true,
             // Setting the feeder's own count moves nothing.
-            92.0 if words.iter().all(|(letter, _)| matches!(letter, 'G' | 'E')) => {}
+            92.0 if words.iter().all(|(letter, _)| matches!(letter, 'G' | 'E'))
+                && words.iter().any(|(letter, _)| *letter == 'E') => {}
             _ if IDLE.contains(&number) => {}
             _ => return Err(unknown(line, 'G', number)),
         }

@@ -30,6 +30,13 @@ pub fn plan(
             job.unit
         )));
     }
+    if !run.control.target.is_constant() {
+        return Err(wrong(
+            "found a target that changes in [control], expected one \
+                          target_width_mm: a plan is for one width"
+                .to_owned(),
+        ));
+    }
     let limits = run.limits;
     let (low, high) = job.speeds();
     let (min, max) = (limits.min_speed.get(), limits.max_speed.get());
