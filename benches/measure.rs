@@ -44,13 +44,13 @@ const FULL: &str = include_str!("../calib/example.toml");
 
 fn gauge(axis: Axis, method: Method) -> Gauge {
     Gauge {
-        roi: Roi { x: 40, y: 20, width: 640, height: 500 },
-        axis,
-        polarity: Polarity::Bright,
-        width_range: (Mm::constant(20.0), Mm::constant(60.0)),
         method,
-        calipers: 64,
-        min_contrast_grey: 6.0,
+        ..Gauge::new(
+            Roi { x: 40, y: 20, width: 640, height: 500 },
+            axis,
+            Polarity::Bright,
+            (Mm::constant(20.0), Mm::constant(60.0)),
+        )
     }
 }
 

@@ -9,7 +9,7 @@ use truebead::sim::picture::{Motion, Picture};
 use truebead::sim::render::Renderer;
 use truebead::time::Stamp;
 use truebead::units::Mm;
-use truebead::vision::{Axis, Gauge, Method, Polarity};
+use truebead::vision::{Axis, Gauge, Polarity};
 
 const USUAL: Picture = Picture { size_px: [720, 100], ..Picture::USUAL };
 
@@ -34,15 +34,12 @@ fn disturbed(name: &str) -> Picture {
 
 #[divan::bench(args = NAMES)]
 fn picture(bencher: Bencher<'_, '_>, name: &str) {
-    let gauge = Gauge {
-        roi: Roi { x: 40, y: 10, width: 640, height: 80 },
-        axis: Axis::Vertical,
-        polarity: Polarity::Bright,
-        width_range: (Mm::constant(20.0), Mm::constant(60.0)),
-        method: Method::Caliper,
-        calipers: 64,
-        min_contrast_grey: 6.0,
-    };
+    let gauge = Gauge::new(
+        Roi { x: 40, y: 10, width: 640, height: 80 },
+        Axis::Vertical,
+        Polarity::Bright,
+        (Mm::constant(20.0), Mm::constant(60.0)),
+    );
     let scale = Calibration::Scale { mm_per_px: 0.126_582, sigma: None };
     let renderer = Renderer::new(scale, Mm::ZERO, gauge, disturbed(name), 1).expect("a sound cell");
     let bead = |_: f64| Some((-21.0, 21.0));

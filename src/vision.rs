@@ -3,6 +3,7 @@
 //! [`Measurer`] has seen its first frame.
 //!
 //! ```text
+//! gamma    grey levels of a camera with a gamma → light
 //! strip    frame → rows across the bead
 //! noise    rows → what a pixel's noise is
 //! pool     rows → bands, a profile of a few rows each
@@ -45,6 +46,7 @@ mod cut_off;
 mod edge;
 mod edge_lines;
 mod fit;
+mod gamma;
 pub mod gauge;
 mod line;
 mod measure;
@@ -73,7 +75,7 @@ mod waviness;
 mod whiten;
 pub mod width;
 
-pub use gauge::{Axis, Gauge, Method, Polarity};
+pub use gauge::{Axis, EdgeKind, Gauge, Method, Polarity};
 pub use measure::Measurer;
 pub use reject::Reject;
 pub use width::{Caliper, EdgePlace, Edges, Hints, WidthMeasurement};

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use truebead::config::Cell;
 use truebead::config::cell::{CalibrationSource, Purpose};
 use truebead::io::calibration_file;
+use truebead::vision::EdgeKind;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -80,6 +81,38 @@ fn a_single_scale_may_have_a_standard_deviation_smaller_than_itself() {
         text.replace("mm_per_px = 0.126582", "file = \"a.toml\"\nmm_per_px_sigma = 0.1");
     let said = Cell::parse(Path::new("cell.toml"), &of_a_file, Purpose::Measure).unwrap_err();
     assert!(said.to_string().contains("expected mm_per_px beside it"), "{said}");
+}
+
+#[test]
+fn the_gauge_names_edge_sigma_and_gamma() {
+    let text = fs::read_to_string(root().join("cells/process.toml")).unwrap();
+    let with = |line: &str| {
+        let key = line.split_once(' ').unwrap().0;
+        let rest = text.lines().filter(|line| !line.starts_with(key)).collect::<Vec<_>>();
+        let text = format!("{}\n{line}\n", rest.join("\n"));
+        Cell::parse(Path::new("cell.toml"), &text, Purpose::Measure)
+    };
+    let gauge = |line: &str| with(line).unwrap().gauge;
+    let plain = gauge("channel = \"grey\"");
+    assert_eq!((plain.edge, plain.max_sigma, plain.gamma), (EdgeKind::Auto, 0.02, None));
+    assert_eq!(gauge("edge = \"groove\"").edge, EdgeKind::Groove);
+    assert_eq!(gauge("edge = \"step\"").edge, EdgeKind::Step);
+    assert_eq!(gauge("max_sigma = 0.5").max_sigma, 0.5);
+    assert_eq!(gauge("gamma = 0.45").gamma, Some(0.45));
+    for (line, expected) in [
+        ("edge = \"seam\"", "gauge.edge: found \"seam\", expected"),
+        ("max_sigma = 0", "gauge.max_sigma: found 0, expected a fraction of the width above 0"),
+        ("max_sigma = 0.6", "gauge.max_sigma: found 0.6, expected a number from 0 to 0.5"),
+        ("gamma = 0.1", "gauge.gamma: found 0.1, expected a number from 0.2 to 5"),
+        ("gamma = \"srgb\"", "gauge.gamma: found \"srgb\", expected a number"),
+        (
+            "gamma = 0.45\nmethod = \"edge_lines\"",
+            "gauge.gamma: found 0.45, expected no gamma beside method = \"edge_lines\"",
+        ),
+    ] {
+        let said = with(line).unwrap_err().to_string();
+        assert!(said.contains(expected), "no \"{expected}\" in\n{said}");
+    }
 }
 
 #[test]

@@ -161,17 +161,17 @@ mod tests {
     use crate::offline::row::sample;
     use crate::time::Stamp;
     use crate::units::Mm;
-    use crate::vision::{Axis, Method, Polarity};
+    use crate::vision::{Axis, Polarity};
 
     fn picker() -> FramePicker {
         FramePicker::new(Gauge {
-            roi: Roi { x: 4, y: 4, width: 24, height: 16 },
-            axis: Axis::Vertical,
-            polarity: Polarity::Any,
-            width_range: (Mm::constant(1.0), Mm::constant(100.0)),
-            method: Method::Caliper,
             calipers: 8,
-            min_contrast_grey: 6.0,
+            ..Gauge::new(
+                Roi { x: 4, y: 4, width: 24, height: 16 },
+                Axis::Vertical,
+                Polarity::Any,
+                (Mm::constant(1.0), Mm::constant(100.0)),
+            )
         })
     }
 

@@ -21,22 +21,19 @@ use crate::frame::{Frame, Pixels};
 use crate::geometry::{ImagePoint, Roi};
 use crate::time::Stamp;
 use crate::units::{Mm, MmPerS, MmPerS2};
-use crate::vision::{Axis, Edges, Gauge, Method, Polarity, WidthMeasurement};
+use crate::vision::{Axis, Edges, Gauge, Polarity, WidthMeasurement};
 
 const SIZE: (usize, usize) = (720, 540);
 const MM_PER_PX: f64 = 0.126_582;
 const MM_BEHIND: f64 = 88.4;
 
 pub fn gauge() -> Gauge {
-    Gauge {
-        roi: Roi { x: 100, y: 60, width: 520, height: 420 },
-        axis: Axis::Vertical,
-        polarity: Polarity::Bright,
-        width_range: (Mm::constant(20.0), Mm::constant(60.0)),
-        method: Method::Caliper,
-        calipers: 64,
-        min_contrast_grey: 6.0,
-    }
+    Gauge::new(
+        Roi { x: 100, y: 60, width: 520, height: 420 },
+        Axis::Vertical,
+        Polarity::Bright,
+        (Mm::constant(20.0), Mm::constant(60.0)),
+    )
 }
 
 pub fn options(folder: &Path, title: &str, with_control: bool) -> LogOptions {

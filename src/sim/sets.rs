@@ -8,7 +8,7 @@ use super::bead::Roughness;
 use super::picture::Picture;
 use crate::geometry::Roi;
 use crate::units::Mm;
-use crate::vision::{Axis, Gauge, Method, Polarity};
+use crate::vision::{Axis, Gauge, Polarity};
 
 pub use limits::Limits;
 pub use list::all;
@@ -115,15 +115,7 @@ impl Set {
             Axis::Horizontal => Roi { x: first, y: 40, width: rows, height: ACROSS.0 },
         };
         let range = if self.width_mm < 20.0 { [5.0, 25.0] } else { [20.0, 60.0] };
-        Gauge {
-            roi,
-            axis: self.axis,
-            polarity: self.polarity,
-            width_range: (Mm::constant(range[0]), Mm::constant(range[1])),
-            method: Method::Caliper,
-            calipers: 64,
-            min_contrast_grey: 6.0,
-        }
+        Gauge::new(roi, self.axis, self.polarity, (Mm::constant(range[0]), Mm::constant(range[1])))
     }
 }
 

@@ -115,18 +115,15 @@ pub struct Place {
 mod tests {
     use super::*;
     use crate::units::Mm;
-    use crate::vision::{Method, Polarity};
+    use crate::vision::Polarity;
 
     fn gauge(axis: Axis) -> Gauge {
-        Gauge {
-            roi: Roi { x: 10, y: 20, width: 101, height: 51 },
+        Gauge::new(
+            Roi { x: 10, y: 20, width: 101, height: 51 },
             axis,
-            polarity: Polarity::Bright,
-            width_range: (Mm::ZERO, Mm::constant(50.0)),
-            method: Method::Caliper,
-            calipers: 64,
-            min_contrast_grey: 6.0,
-        }
+            Polarity::Bright,
+            (Mm::ZERO, Mm::constant(50.0)),
+        )
     }
 
     #[test]

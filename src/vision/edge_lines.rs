@@ -228,13 +228,13 @@ mod tests {
 
     fn gauge() -> Gauge {
         Gauge {
-            roi: Roi { x: 10, y: 5, width: 140, height: 90 },
-            axis: Axis::Vertical,
-            polarity: Polarity::Bright,
-            width_range: (Mm::constant(2.0), Mm::constant(20.0)),
             method: Method::EdgeLines,
-            calipers: 64,
-            min_contrast_grey: 6.0,
+            ..Gauge::new(
+                Roi { x: 10, y: 5, width: 140, height: 90 },
+                Axis::Vertical,
+                Polarity::Bright,
+                (Mm::constant(2.0), Mm::constant(20.0)),
+            )
         }
     }
 

@@ -34,6 +34,27 @@ pub enum Method {
     EdgeLines,
 }
 
+/// What the bead's edges look like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EdgeKind {
+    /// Found from the frame.
+    Auto,
+    /// A step of brightness: the bead lies on ground that is brighter or darker.
+    Step,
+    /// A dark groove, beyond which the ground or another bead may be as bright
+    /// as the bead itself.
+    Groove,
+}
+
+/// Caliper lines along a gauge whose cell names no number.
+pub const CALIPERS: usize = 64;
+/// Smallest contrast where the cell names none: about three times the noise of an
+/// industrial camera at full scale \[grey levels of 256\].
+pub const MIN_CONTRAST_GREY: f64 = 6.0;
+/// Largest standard deviation of a width where the cell names none, as a fraction
+/// of the width: tolerances of printed beads are 5 % and more.
+pub const MAX_SIGMA: f64 = 0.02;
+
 /// The gauge: region, orientation and expectations of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gauge {
@@ -43,7 +64,7 @@ pub struct Gauge {
     pub axis: Axis,
     /// The bead against its surroundings.
     pub polarity: Polarity,
-    /// Narrowest and widest bead that is believed.
+    /// Narrowest and widest bead that is plausible.
     pub width_range: (Mm, Mm),
     /// How edges are found.
     pub method: Method,
@@ -52,9 +73,33 @@ pub struct Gauge {
     /// Smallest step from ground to bead that is taken for an edge, on a scale
     /// of 256 grey levels.
     pub min_contrast_grey: f64,
+    /// What the bead's edges look like.
+    pub edge: EdgeKind,
+    /// Largest standard deviation of a width that is measured, as a fraction of
+    /// the width.
+    pub max_sigma: f64,
+    /// Exponent of the camera: grey = 255 · (light / white)^gamma. Where there is
+    /// none, grey is proportional to light.
+    pub gamma: Option<f64>,
 }
 
 impl Gauge {
+    /// A gauge with the cell file's defaults for everything else.
+    pub fn new(roi: Roi, axis: Axis, polarity: Polarity, width_range: (Mm, Mm)) -> Self {
+        Self {
+            roi,
+            axis,
+            polarity,
+            width_range,
+            method: Method::Caliper,
+            calipers: CALIPERS,
+            min_contrast_grey: MIN_CONTRAST_GREY,
+            edge: EdgeKind::Auto,
+            max_sigma: MAX_SIGMA,
+            gamma: None,
+        }
+    }
+
     /// Its length along the bead on a surface; `None` where an end does not see
     /// the surface.
     pub fn length_on(&self, map: &SurfaceMap) -> Option<Mm> {
@@ -81,15 +126,9 @@ mod tests {
 
     #[test]
     fn a_gauge_is_as_long_as_its_rows_or_its_columns() {
-        let gauge = |axis| Gauge {
-            roi: Roi { x: 10, y: 20, width: 100, height: 50 },
-            axis,
-            polarity: Polarity::Bright,
-            width_range: (Mm::ZERO, Mm::constant(50.0)),
-            method: Method::Caliper,
-            calipers: 64,
-            min_contrast_grey: 6.0,
-        };
+        let roi = Roi { x: 10, y: 20, width: 100, height: 50 };
+        let range = (Mm::ZERO, Mm::constant(50.0));
+        let gauge = |axis| Gauge::new(roi, axis, Polarity::Bright, range);
         let map = SurfaceMap::from_scale(0.1);
         let length = |axis| gauge(axis).length_on(&map).unwrap().get();
         assert!((length(Axis::Vertical) - 5.0).abs() < 1e-9);

@@ -94,7 +94,7 @@ impl Measurer {
             left_px: Vec::new(),
             right_px: Vec::new(),
         };
-        Self { gauge, white, turner: Turner::default(), work }
+        Self { gauge, white, turner: Turner::new(gauge.gamma), work }
     }
 
     /// The edges behind the last width, for pictures of them.
@@ -133,13 +133,17 @@ impl Measurer {
         Some(EdgePlace { at: points.next()?, sigma_px: Some(located.variance.sqrt()) })
     }
 
-    /// Measures the bead in a frame on a surface.
+    /// Measures the bead in a frame on a surface. Refuses a width whose standard
+    /// deviation is more than the gauge's `max_sigma` of it.
     pub fn measure(
         &mut self,
         frame: &Frame,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
-        self.measure_picture(frame, surface)?.with_calibration(surface)
+        let edges_only = self.measure_picture(frame, surface)?;
+        let found = edges_only.with_calibration(surface)?;
+        found.check_sigma(edges_only.sigma, self.gauge.max_sigma)?;
+        Ok(found)
     }
 
     /// The same with no more in sigma than the picture itself leaves open.

@@ -35,7 +35,7 @@ pub fn of<T: Grey>(strip: &Strip<'_, T>, columns: Range<usize>) -> f32 {
             *difference = here.away_from(*there);
         }
     }
-    let least = LEAST * strip.scale;
+    let least = LEAST * strip.level_step;
     if rows * run == 0 {
         least
     } else {

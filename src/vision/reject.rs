@@ -64,12 +64,32 @@ pub enum Reject {
         /// Largest that is borne \[px\].
         limit_px: f64,
     },
-    /// The bead's edges are known too badly: too much of them is covered.
-    Unsure {
+    /// The bead's edges are too uncertain: too much of them is occluded.
+    Occluded {
         /// Standard deviation of the width \[px\].
         got_px: f64,
-        /// Largest that is believed \[px\].
+        /// Largest that is accepted \[px\].
         limit_px: f64,
+    },
+    /// A width was found, but its standard deviation is too large a fraction of
+    /// it.
+    Unsure {
+        /// Width that was found \[mm\].
+        width_mm: f64,
+        /// Its standard deviation \[mm\].
+        sigma_mm: f64,
+        /// The same without the calibration's uncertainty \[mm\].
+        edges_sigma_mm: f64,
+        /// Largest standard deviation, as a fraction of the width: the gauge's
+        /// `max_sigma`.
+        max_sigma: f64,
+    },
+    /// Two pairs of edges fit equally well.
+    Ambiguous {
+        /// Width of the one pair \[mm\].
+        first_mm: f64,
+        /// Width of the other \[mm\].
+        second_mm: f64,
     },
     /// An edge lies so near the border of the gauge that it is cut short.
     Clipped {
@@ -106,7 +126,8 @@ impl Reject {
             Self::WidthOutOfRange { .. } => "width_out_of_range",
             Self::Crooked { .. } => "crooked",
             Self::Corner { .. } => "corner",
-            Self::Scattered { .. } | Self::Unsure { .. } => "unsure",
+            Self::Scattered { .. } | Self::Occluded { .. } | Self::Unsure { .. } => "unsure",
+            Self::Ambiguous { .. } => "ambiguous",
             Self::Clipped { .. } => "clipped",
             Self::WrongSize { .. } | Self::OtherSize { .. } => "wrong_size",
             Self::OffSurface => "off_surface",
@@ -160,9 +181,27 @@ impl fmt::Display for Reject {
                 f,
                 "the places of an edge scatter by {got_px:.2} px about each other, {limit_px:.2} are bearable; along a rough bead more caliper lines help"
             ),
-            Self::Unsure { got_px, limit_px } => write!(
+            Self::Occluded { got_px, limit_px } => write!(
                 f,
-                "so much of the edges is covered that the width is unsure by {got_px:.2} px, {limit_px:.2} are bearable"
+                "so much of the edges is occluded that the standard deviation of the width is {got_px:.2} px, the limit is {limit_px:.2}; the occluded rows have to be made visible"
+            ),
+            Self::Unsure { width_mm, sigma_mm, edges_sigma_mm, max_sigma } => {
+                let advice = if *edges_sigma_mm <= max_sigma * width_mm {
+                    "the calibration's uncertainty takes it beyond the limit: calibrate again with more images"
+                } else {
+                    "a longer gauge along the bead or a higher contrast lowers it"
+                };
+                write!(
+                    f,
+                    "width of {width_mm:.2} mm with a standard deviation of {sigma_mm:.3} mm ({:.1} %), max_sigma is {:.3} mm ({:.1} %); {advice}",
+                    100.0 * sigma_mm / width_mm,
+                    max_sigma * width_mm,
+                    100.0 * max_sigma,
+                )
+            }
+            Self::Ambiguous { first_mm, second_mm } => write!(
+                f,
+                "two pairs of edges fit equally well, one {first_mm:.2} mm wide, the other {second_mm:.2} mm; a narrower width_range_mm, or a given polarity or edge, decides between them"
             ),
             Self::Clipped { got_px, need_px } => write!(
                 f,

@@ -7,6 +7,7 @@
 use crate::frame::{Frame, Pixels};
 use crate::geometry::{ImagePoint, Roi};
 
+use super::gamma::Linear;
 use super::gauge::Axis;
 
 /// Side of the squares in which a region is turned: a row of one fits a register,
@@ -134,6 +135,8 @@ pub struct Strip<'a, T> {
     pub white: T,
     /// Grey levels of 256 for one step of the camera's scale.
     pub scale: f32,
+    /// Distance of the grey levels that the camera can tell apart, of 256.
+    pub level_step: f32,
 }
 
 impl<'a, T: Grey> Strip<'a, T> {
@@ -155,11 +158,15 @@ impl<'a, T: Grey> Strip<'a, T> {
 }
 
 /// Frames laid out in rows across the bead; keeps the memory for those of
-/// horizontal beads, which have to be turned.
+/// horizontal beads, which have to be turned, and for light where the camera has
+/// a gamma.
 #[derive(Debug, Clone, Default)]
 pub struct Turner {
     bytes: Vec<u8>,
     words: Vec<u16>,
+    gamma: Option<f64>,
+    linear: Option<Linear>,
+    light: Vec<u16>,
 }
 
 /// A strip of either depth.
@@ -172,8 +179,14 @@ pub enum Strips<'a> {
 }
 
 impl Turner {
+    /// For a camera with a gamma, or without one.
+    pub fn new(gamma: Option<f64>) -> Self {
+        Self { gamma, ..Self::default() }
+    }
+
     /// The gauge's rows in a frame in which it fits. `white` is the upper end
-    /// of the scale where it is not that of the pixels.
+    /// of the scale where it is not that of the pixels. Of a camera with a gamma
+    /// the rows are light, in 16 bits.
     pub fn strips<'a>(
         &'a mut self,
         frame: &'a Frame,
@@ -183,13 +196,43 @@ impl Turner {
         match frame.pixels() {
             Pixels::Grey8(values) => {
                 let white = white.map_or(u8::MAX, |white| u8::try_from(white).unwrap_or(u8::MAX));
-                Strips::Bytes(lay(values, frame.width(), view, white, &mut self.bytes))
+                let strip = lay(values, frame.width(), view, white, &mut self.bytes);
+                let Some(gamma) = self.gamma else { return Strips::Bytes(strip) };
+                Strips::Words(to_light(&strip, gamma, &mut self.linear, &mut self.light))
             }
             Pixels::Grey16(values) => {
                 let white = white.unwrap_or(u16::MAX);
-                Strips::Words(lay(values, frame.width(), view, white, &mut self.words))
+                let strip = lay(values, frame.width(), view, white, &mut self.words);
+                let Some(gamma) = self.gamma else { return Strips::Words(strip) };
+                Strips::Words(to_light(&strip, gamma, &mut self.linear, &mut self.light))
             }
         }
+    }
+}
+
+/// The light behind a strip's grey levels. The table is made for the first frame
+/// and kept.
+fn to_light<'a, T: Grey + Into<u16>>(
+    strip: &Strip<'_, T>,
+    gamma: f64,
+    linear: &mut Option<Linear>,
+    memory: &'a mut Vec<u16>,
+) -> Strip<'a, u16> {
+    let white = strip.white.into();
+    let known = linear.take().filter(|linear| linear.is_for(gamma, white));
+    let linear = linear.insert(known.unwrap_or_else(|| Linear::new(gamma, white)));
+    memory.clear();
+    for v in 0..strip.along {
+        memory.extend(strip.row(v).iter().map(|&level| linear.light(level.into())));
+    }
+    Strip {
+        values: memory,
+        stride: strip.across,
+        across: strip.across,
+        along: strip.along,
+        white: u16::MAX,
+        scale: 255.0 / f32::from(u16::MAX),
+        level_step: strip.level_step,
     }
 }
 
@@ -210,7 +253,8 @@ fn lay<'a, T: Grey>(
     };
     #[expect(clippy::cast_precision_loss, reason = "16 bits fit a float")]
     let scale = 255.0 / white.level().max(1) as f32;
-    Strip { values, stride, across: view.across, along: view.along, white, scale }
+    let (across, along) = (view.across, view.along);
+    Strip { values, stride, across, along, white, scale, level_step: scale }
 }
 
 /// Writes columns of the region as rows, tile by tile; what is left at the ends

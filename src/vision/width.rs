@@ -37,6 +37,17 @@ impl WidthMeasurement {
         let sigma = Mm::new(variance.sqrt()).map_err(|_| Reject::OffSurface)?;
         Ok(Self { sigma, ..self })
     }
+
+    /// Refuses a width whose standard deviation is more than a fraction of it.
+    /// `from_edges` is the standard deviation without the calibration's.
+    pub(super) fn check_sigma(&self, from_edges: Mm, max_sigma: f64) -> Result<(), Reject> {
+        let (width_mm, sigma_mm) = (self.width.get(), self.sigma.get());
+        if sigma_mm <= max_sigma * width_mm {
+            return Ok(());
+        }
+        let edges_sigma_mm = from_edges.get();
+        Err(Reject::Unsure { width_mm, sigma_mm, edges_sigma_mm, max_sigma })
+    }
 }
 
 /// How good the picture is.

@@ -3,17 +3,17 @@ use crate::frame::Pixels;
 use crate::offline::row::sample;
 use crate::time::Stamp;
 use crate::units::Mm;
-use crate::vision::{Axis, Method, Polarity};
+use crate::vision::{Axis, Polarity};
 
 fn gauge(roi: Roi) -> Gauge {
     Gauge {
-        roi,
-        axis: Axis::Vertical,
-        polarity: Polarity::Bright,
-        width_range: (Mm::constant(1.0), Mm::constant(100.0)),
-        method: Method::Caliper,
         calipers: 16,
-        min_contrast_grey: 6.0,
+        ..Gauge::new(
+            roi,
+            Axis::Vertical,
+            Polarity::Bright,
+            (Mm::constant(1.0), Mm::constant(100.0)),
+        )
     }
 }
 

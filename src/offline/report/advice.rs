@@ -32,10 +32,16 @@ pub fn on(status: &str) -> (&'static str, &'static str) {
             "Make roi_px larger across the bead, or bring the bead back to its middle.",
         ),
         "unsure" => (
-            "An edge scatters, or so much of it is covered, by grains or spots, that the rest does not \
-             tell its course.",
-            "Clear the bed of grains, shade what glitters, make the gauge longer, or ask for more \
-             calipers along a rough bead.",
+            "The standard deviation of the width is more than max_sigma of it, or too little of an \
+             edge is seen.",
+            "Make the gauge longer along the bead and raise the contrast of the edges; remove what \
+             occludes them. The first message of this status says whether the calibration's \
+             uncertainty is the larger part. Raise max_sigma only if such widths are good enough.",
+        ),
+        "ambiguous" => (
+            "Two pairs of edges fit the bead equally well.",
+            "Narrow width_range_mm so that only one of them is a possible width, or name the \
+             polarity and the kind of edge.",
         ),
         "wrong_size" => (
             "The gauge does not lie within the image, or the calibration was made with images of \
@@ -76,7 +82,9 @@ mod tests {
             Reject::Crooked { got_rad: 1.0, limit_rad: 0.3 },
             Reject::Corner { got_widths: 0.5, least_widths: 1.5 },
             Reject::Scattered { got_px: 2.0, limit_px: 1.5 },
-            Reject::Unsure { got_px: 0.4, limit_px: 0.2 },
+            Reject::Occluded { got_px: 0.4, limit_px: 0.2 },
+            Reject::Unsure { width_mm: 9.0, sigma_mm: 0.9, edges_sigma_mm: 0.9, max_sigma: 0.02 },
+            Reject::Ambiguous { first_mm: 9.0, second_mm: 12.0 },
             Reject::Clipped { got_px: 1.0, need_px: 3.0 },
             Reject::WrongSize { image: (1, 1) },
             Reject::OtherSize { image: (1, 1), calibrated: [2, 2] },

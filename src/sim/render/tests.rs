@@ -3,22 +3,14 @@ use nalgebra::Vector3;
 use super::*;
 use crate::calib::Camera;
 use crate::geometry::{Pose, Roi};
-use crate::vision::{Method, Polarity};
+use crate::vision::Polarity;
 
 mod disturbed;
 
 const PAPER_SCALE: f64 = 0.126_582;
 
 fn gauge(roi: Roi, axis: Axis) -> Gauge {
-    Gauge {
-        roi,
-        axis,
-        polarity: Polarity::Bright,
-        width_range: (Mm::constant(1.0), Mm::constant(90.0)),
-        method: Method::Caliper,
-        calipers: 64,
-        min_contrast_grey: 6.0,
-    }
+    Gauge::new(roi, axis, Polarity::Bright, (Mm::constant(1.0), Mm::constant(90.0)))
 }
 
 fn upright() -> Gauge {

@@ -119,7 +119,7 @@ impl Work {
             (COVERED_SIGMA_PX, sides.iter().any(sparse))
         };
         if unsure && got_px > limit {
-            return Err(Reject::Unsure { got_px, limit_px: limit });
+            return Err(Reject::Occluded { got_px, limit_px: limit });
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use crate::sim::bead::{BeadModel, Roughness};
 use crate::sim::disturbance::Flow;
 use crate::sim::picture::Picture;
 use crate::units::{Mm, MmPerS};
-use crate::vision::{Axis, Gauge, Method, Polarity};
+use crate::vision::{Axis, Gauge, Polarity};
 
 const SMOOTH_STEADY: Simulation = Simulation {
     seed: 1,
@@ -45,13 +45,13 @@ const SMOOTH_STEADY: Simulation = Simulation {
 
 fn camera() -> (RenderedCamera, RobotView, Sender<()>) {
     let gauge = Gauge {
-        roi: Roi { x: 10, y: 10, width: 140, height: 100 },
-        axis: Axis::Vertical,
-        polarity: Polarity::Bright,
-        width_range: (Mm::constant(1.0), Mm::constant(15.0)),
-        method: Method::Caliper,
         calipers: 32,
-        min_contrast_grey: 6.0,
+        ..Gauge::new(
+            Roi { x: 10, y: 10, width: 140, height: 100 },
+            Axis::Vertical,
+            Polarity::Bright,
+            (Mm::constant(1.0), Mm::constant(15.0)),
+        )
     };
     let described = Camera {
         source: Source::Rendered,
