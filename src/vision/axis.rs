@@ -53,6 +53,9 @@ pub struct Side<'a> {
     /// What a row leaves of the step that it is held against, in standard
     /// deviations of its noise; infinite where it was not held against one.
     pub misfit: f64,
+    /// Variance of the mean position over the gauge \[px²\], where it is known
+    /// without looking at how far the places lie off their course.
+    pub mean_variance: Option<f64>,
 }
 
 /// What a width is taken from.

@@ -3,6 +3,7 @@
 
 mod judge;
 mod locate;
+mod rough;
 mod search;
 #[cfg(test)]
 mod tests;
@@ -10,8 +11,10 @@ mod tests;
 use crate::calib::SurfaceMap;
 use crate::frame::Frame;
 use crate::geometry::ImagePoint;
+use rough::may_be_rough;
 
 use super::axis;
+use super::coarse::Coarse;
 use super::contour::Contours;
 use super::edge::Candidates;
 use super::edge_lines;
@@ -20,6 +23,7 @@ use super::noise;
 use super::parallel::Parallel;
 use super::pool::{self, Bands};
 use super::reject::Reject;
+use super::rough::RoughEdge;
 use super::step::StepTable;
 use super::strip::{Grey, Strip, Strips, Turner, View};
 use super::trace::Tracer;
@@ -54,6 +58,8 @@ struct Work {
     ups: Contours,
     downs: Contours,
     parallel: Parallel,
+    coarse: Coarse,
+    rough: [RoughEdge; 2],
     left: Tracer,
     right: Tracer,
     least_off_px: f64,
@@ -83,6 +89,8 @@ impl Measurer {
             ups: Contours::default(),
             downs: Contours::default(),
             parallel: Parallel::default(),
+            coarse: Coarse::default(),
+            rough: Default::default(),
             left: Tracer::default(),
             right: Tracer::default(),
             least_off_px: OFF_PX,
@@ -209,6 +217,23 @@ impl Work {
         self.noise = noise::of(strip, 0..strip.across);
         self.bands.pool(strip, self.gauge.calipers);
         pool::cut(strip.along, self.gauge.calipers, &mut self.lines);
+        match self.measure_steps(strip, range, view, surface) {
+            Err(reject) if may_be_rough(&reject) => {
+                self.measure_rough(strip, range, view, surface).or(Err(reject))
+            }
+            found => found,
+        }
+    }
+
+    /// Measures edges that are blurred steps.
+    #[inline(always)]
+    fn measure_steps<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        range: (f32, f32),
+        view: &View,
+        surface: &SurfaceMap,
+    ) -> Result<WidthMeasurement, Reject> {
         self.find_candidates();
         let pair = self.find_pair(range)?;
         self.trace(strip, pair)?;
@@ -238,6 +263,7 @@ impl Work {
             places: tracer.edges(),
             common_variance: tracer.common_variance,
             misfit: tracer.misfit,
+            mean_variance: tracer.mean_variance,
         });
         let (gauge, middles) = (&self.gauge, self.middles.as_slice());
         let scene = axis::Scene { view, surface, gauge, middles, sides };

@@ -16,6 +16,7 @@ use super::overlay::{Extent, Look, Overlay, REACH, Shape, Step};
 use super::path::{self, Course};
 use super::pool::{self, Bands};
 use super::refine::{Refiner, Task};
+use super::rough::RoughFit;
 use super::sheet::Sheet;
 use super::step::StepTable;
 use super::strip::{Grey, Strip};
@@ -143,9 +144,22 @@ pub struct Tracer {
     /// Variance of the whole edge's position that all places share, from
     /// shading that is not known better \[px²\].
     pub common_variance: f64,
+    /// Variance of the mean position, where it is known apart from that of the
+    /// places \[px²\].
+    pub mean_variance: Option<f64>,
 }
 
 impl Tracer {
+    /// Takes over places that were found without a model of the flank.
+    pub fn take_rough(&mut self, places: &[Option<Located>], fit: &RoughFit) {
+        self.edges.clear();
+        self.edges.extend_from_slice(places);
+        self.blur_px = fit.blur_px;
+        (self.common_variance, self.mean_variance) = (0.0, Some(fit.variance));
+        self.misfit = f64::INFINITY;
+        self.state = State::Open;
+    }
+
     /// The edges of the last frame, band by band.
     pub fn edges(&self) -> &[Option<Located>] {
         &self.edges
@@ -206,6 +220,7 @@ impl Tracer {
         rough: impl Iterator<Item = Option<f32>>,
     ) -> Option<(f64, f64)> {
         self.edges.clear();
+        self.mean_variance = None;
         self.seen = None;
         self.path.clear();
         self.state = State::Unseen;

@@ -40,12 +40,17 @@ impl Spread {
     ) -> Self {
         let (mut variance, mut noise) = (0.0, 0.0);
         for (side, curve) in curves.iter().enumerate() {
+            let scale = sections.scales[side] * sections.scales[side];
             let per_place = mean_variance(scene.sides[side].places);
+            if let Some(of_mean) = scene.sides[side].mean_variance {
+                variance += scale * of_mean;
+                noise += scale * per_place;
+                continue;
+            }
             let off = &memory.off[side];
             let inflation = scatter::inflation(off, per_place, &mut memory.values)
                 .unwrap_or_else(|| scene.sides[side].inflation_with_gaps(off, curve, per_place))
                 .min(scene.sides[side].most_inflation());
-            let scale = sections.scales[side] * sections.scales[side];
             let of_mean = per_place * inflation * curve.mean_variance;
             variance += scale * (of_mean + scene.sides[side].common_variance);
             noise += scale * per_place * inflation;

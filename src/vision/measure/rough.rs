@@ -1,0 +1,68 @@
+//! Beads whose edges are no blurred steps: torn ones, grooves, texture.
+
+use super::{NEED_SHARE, Work};
+use crate::calib::SurfaceMap;
+use crate::vision::gauge::Polarity;
+use crate::vision::reject::Reject;
+use crate::vision::rough::Scene;
+use crate::vision::strip::{Grey, Strip, View};
+use crate::vision::width::WidthMeasurement;
+
+/// Lowest step of a coarse contour, as a fraction of the gauge's smallest
+/// contrast: the coarse scale lowers narrow grooves.
+const COARSE_STEP: f64 = 0.4;
+
+impl Work {
+    /// Measures a bead by where its rows pass half height.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn measure_rough<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        range: (f32, f32),
+        view: &View,
+        surface: &SurfaceMap,
+    ) -> Result<WidthMeasurement, Reject> {
+        let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
+        #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
+        let min_step = (COARSE_STEP * self.gauge.min_contrast_grey) as f32;
+        self.coarse.look(strip, (range.0 * range.1).sqrt(), min_step);
+        let polarities =
+            [self.gauge.polarity != Polarity::Dark, self.gauge.polarity != Polarity::Bright];
+        let pair = self.coarse.pair(range, polarities).ok_or(failed)?;
+        let scene = Scene {
+            strip,
+            lines: &self.lines,
+            noise: self.noise,
+            width_px: pair.width_px(),
+            bead_after: true,
+            bright: pair.bright,
+        };
+        let [left, right] = &mut self.rough;
+        let left_fit = left.find(&scene, pair.left()).ok_or(failed)?;
+        let right_scene = Scene { bead_after: false, ..scene };
+        let right_fit = right.find(&right_scene, pair.right()).ok_or(failed)?;
+        let got = left_fit.rows_fraction.min(right_fit.rows_fraction);
+        if got < NEED_SHARE {
+            return Err(Reject::NoPair { got, need: NEED_SHARE });
+        }
+        self.left.take_rough(left.lines(), &left_fit);
+        self.right.take_rough(right.lines(), &right_fit);
+        self.check_contrast()?;
+        self.check_border(strip.across)?;
+        self.width_on(view, surface)
+    }
+}
+
+/// Whether a frame that was refused as one with smooth edges may show a rough
+/// bead.
+pub fn may_be_rough(reject: &Reject) -> bool {
+    matches!(
+        reject,
+        Reject::NoPair { .. }
+            | Reject::LowContrast { .. }
+            | Reject::WidthOutOfRange { .. }
+            | Reject::Scattered { .. }
+            | Reject::Unsure { .. }
+    )
+}

@@ -1,0 +1,178 @@
+//! One edge of a bead whose edges are torn, or lie beside a groove or in
+//! texture: where it runs, row by row, without a model of its flank.
+//!
+//! The mean over the rows is the width's share of this edge. The profile along
+//! the bead is signal (the bead's roughness); only pixel noise and texture are
+//! errors of the mean.
+//!
+//! ```text
+//! window    rows about the edge, turned so that the bead lies after it and is bright
+//! route     the course with the strongest step, by dynamic programming
+//! levels    grey of the bead and of what lies outside, along the route
+//! crossing  where each row passes half way between the two
+//! noise     standard deviation of the mean position
+//! ```
+
+mod crossing;
+mod levels;
+mod noise;
+mod route;
+mod window;
+
+use super::curve::{Curve, Point};
+use super::number::{float, narrow};
+use super::rank;
+use super::strip::{Grey, Strip};
+use super::trace::Located;
+use levels::Levels;
+use route::Route;
+use window::Windows;
+
+/// Rounds in which levels are read along the edge that was found with the levels
+/// before.
+const ROUNDS: usize = 2;
+/// Fraction of the rows of a caliper line that must show the edge.
+const MIN_ROWS_FRACTION: f64 = 0.5;
+/// Points of the coarse course farther from it than so many median distances do
+/// not belong to it.
+const OUTLIER_MEDIANS: f64 = 4.0;
+
+/// What is looked at.
+#[derive(Debug, Clone, Copy)]
+pub struct Scene<'a, T> {
+    /// The gauge's pixels.
+    pub strip: &'a Strip<'a, T>,
+    /// Its caliper lines: first row and the row after the last of each.
+    pub lines: &'a [(usize, usize)],
+    /// Standard deviation of a pixel's noise \[grey levels\].
+    pub noise: f32,
+    /// Distance of the two edges \[px\].
+    pub width_px: f32,
+    /// Whether the bead lies after the edge.
+    pub bead_after: bool,
+    /// Whether the bead is brighter than what lies outside.
+    pub bright: bool,
+}
+
+/// Finds one edge; keeps its memory from frame to frame.
+#[derive(Debug, Clone, Default)]
+pub struct RoughEdge {
+    windows: Windows,
+    route: Route,
+    levels: Levels,
+    /// Position in each row's window \[px\]; not a number where there is none.
+    crossings: Vec<f32>,
+    lines: Vec<Option<Located>>,
+    distances: Vec<f64>,
+}
+
+/// What was found of an edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RoughFit {
+    /// Variance of the mean position over the gauge \[px²\].
+    pub variance: f64,
+    /// Fraction of the rows that show the edge.
+    pub rows_fraction: f64,
+    /// Step from outside to the bead \[grey levels\], positive.
+    pub contrast: f64,
+    /// Standard deviation of the Gaussian that has the flank's slope \[px\].
+    pub blur_px: f64,
+}
+
+impl RoughEdge {
+    /// Positions of the last frame, one a caliper line.
+    pub fn lines(&self) -> &[Option<Located>] {
+        &self.lines
+    }
+
+    /// Finds the edge near rough positions, given as place along the bead and
+    /// position across it \[px\]; `None` where no edge runs there.
+    #[inline(always)]
+    pub fn find<T: Grey>(
+        &mut self,
+        scene: &Scene<'_, T>,
+        rough: impl Iterator<Item = (f64, f64)> + Clone,
+    ) -> Option<RoughFit> {
+        let course = self.course(scene, rough)?;
+        self.windows.read(scene, &course);
+        self.route.find(&self.windows, scene.width_px)?;
+        for _ in 0..ROUNDS {
+            self.levels.read(&self.windows, self.route.rows(), scene.width_px)?;
+            self.levels.cross(&self.windows, self.route.rows(), &mut self.crossings);
+            self.route.follow(&self.crossings)?;
+        }
+        let noise = noise::of_mean(&self.windows, &self.levels, scene)?;
+        self.gather(scene, noise.of_row);
+        let seen = self.crossings.iter().filter(|at| at.is_finite()).count();
+        Some(RoughFit {
+            variance: noise.of_mean,
+            rows_fraction: float(seen) / float(self.crossings.len()),
+            contrast: self.levels.contrast(),
+            blur_px: noise.blur_px,
+        })
+    }
+
+    /// A smooth course through the rough positions.
+    fn course<T: Grey>(
+        &mut self,
+        scene: &Scene<'_, T>,
+        rough: impl Iterator<Item = (f64, f64)> + Clone,
+    ) -> Option<Curve> {
+        let reach = float(scene.strip.along) / 2.0;
+        let points = rough.map(|(v, u)| Point { t: (v + 0.5) / reach - 1.0, u, weight: 1.0 });
+        let first = Curve::fit(points.clone(), reach)?;
+        let off = |point: &Point| (point.u - first.at(point.t)).abs();
+        self.distances.clear();
+        self.distances.extend(points.clone().map(|point| off(&point)));
+        let limit = OUTLIER_MEDIANS * rank::median(&mut self.distances)?.max(0.5);
+        Curve::fit(points.filter(|point| off(point) <= limit), reach)
+    }
+
+    /// Positions of the caliper lines from those of their rows.
+    fn gather<T: Grey>(&mut self, scene: &Scene<'_, T>, variance_of_row: f64) {
+        let (windows, crossings) = (&self.windows, &self.crossings);
+        let height = self.levels.contrast();
+        self.lines.clear();
+        let mut next = 0;
+        for line in 0..scene.lines.len() {
+            let (mut sum, mut seen, mut rows) = (0.0, 0.0, 0.0);
+            while next < windows.count() && windows.line(next) == line {
+                let weight = windows.rows(next);
+                rows += weight;
+                if let Some(at) = windows.position(next, crossings[next]) {
+                    // Rows that are missing on one side of the line's middle
+                    // must not slant it.
+                    sum += weight * at;
+                    seen += weight;
+                }
+                next += 1;
+            }
+            let located = (seen >= MIN_ROWS_FRACTION * rows && seen > 0.0).then(|| Located {
+                at: sum / seen,
+                variance: variance_of_row / seen,
+                height,
+                share: seen / rows,
+            });
+            self.lines.push(located);
+        }
+    }
+}
+
+/// A number of rows or pixels from a length.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "lengths are a few pixels and not negative"
+)]
+pub fn whole(length: f32) -> usize {
+    length.max(0.0).round() as usize
+}
+
+/// The Gaussian kernel of a standard deviation \[samples\], normalised, from its
+/// middle outwards; three standard deviations long.
+fn kernel(sigma: f64) -> Vec<f32> {
+    let half = whole(narrow(3.0 * sigma)).max(1);
+    let value = |k: usize| libm::exp(-0.5 * (float(k) / sigma).powi(2));
+    let sum = 2.0 * (0..=half).map(value).sum::<f64>() - value(0);
+    (0..=half).map(|k| narrow(value(k) / sum)).collect()
+}

@@ -1,0 +1,177 @@
+//! The course of an edge through its windows: the strongest step from dark to
+//! bright that runs along the bead, by dynamic programming over blocks of rows.
+
+use super::whole;
+use super::window::{Row, Windows};
+use crate::vision::number::single;
+use crate::vision::rank;
+use crate::vision::sheet::SPAN;
+
+/// Rows of a block.
+pub const BLOCK: usize = 4;
+/// Pixels on either side that are compared for a step, as a fraction of the
+/// bead's width: wide against texture, narrow against the bead.
+const REACH_FRACTION: f32 = 0.06;
+/// Fewest and most such pixels.
+const REACH_PX: (f32, f32) = (3.0, 10.0);
+/// How far a course may run aside from one block to the next \[px\].
+const MAX_ASIDE: usize = 8;
+/// Cost of running aside, in typical steps a pixel: a tear as deep as a block is
+/// long costs a seventh of the block's own step.
+const ASIDE_COST: f32 = 0.04;
+/// Rank of the typical step among the blocks' strongest.
+const TYPICAL: f32 = 0.7;
+/// Fraction of the width within which an edge lies about its rough course.
+const CORRIDOR_FRACTION: f32 = 0.4;
+/// Half of the corridor at most \[px\].
+const MAX_CORRIDOR_PX: f32 = 40.0;
+
+/// The course of an edge; keeps its memory from frame to frame.
+#[derive(Debug, Clone, Default)]
+pub struct Route {
+    steps: Vec<Row>,
+    scores: Vec<Row>,
+    froms: Vec<[u8; SPAN]>,
+    strongest: Vec<f32>,
+    blocks: Vec<f32>,
+    rows: Vec<f32>,
+}
+
+impl Route {
+    /// Positions of the last course, row by row \[px\] in its window.
+    pub fn rows(&self) -> &[f32] {
+        &self.rows
+    }
+
+    /// Finds the course; `None` where nothing steps up.
+    #[inline(always)]
+    pub fn find(&mut self, windows: &Windows, width_px: f32) -> Option<()> {
+        let reach = (REACH_FRACTION * width_px).clamp(REACH_PX.0, REACH_PX.1);
+        let reach = whole(reach.min(width_px / 3.0)).max(2);
+        let corridor = (CORRIDOR_FRACTION * width_px).min(MAX_CORRIDOR_PX);
+        let middle = SPAN / 2;
+        let half = whole(corridor).clamp(2, middle - reach - 1);
+        let inside = middle - half..middle + half + 1;
+        self.respond(windows, reach);
+        self.link(inside)
+    }
+
+    /// Takes over positions that were found, and fills the rows without one.
+    pub fn follow(&mut self, crossings: &[f32]) -> Option<()> {
+        let mut last: Option<usize> = None;
+        for (number, &at) in crossings.iter().enumerate() {
+            if !at.is_finite() {
+                continue;
+            }
+            let (from, start) = last.map_or((0, at), |last| (last, self.rows[last]));
+            let span = single((number - from).max(1));
+            for between in from..=number {
+                self.rows[between] = start + (at - start) * single(between - from) / span;
+            }
+            last = Some(number);
+        }
+        let last = last?;
+        let end = self.rows[last];
+        self.rows[last..].fill(end);
+        Some(())
+    }
+
+    /// Steps of the blocks: the mean of some pixels after a place less that of
+    /// those before it, over three blocks with weights 1, 2, 1.
+    #[inline(always)]
+    fn respond(&mut self, windows: &Windows, reach: usize) {
+        let count = windows.count().div_ceil(BLOCK);
+        self.scores.resize(count, [0.0; SPAN]);
+        self.steps.resize(count, [0.0; SPAN]);
+        for (rows, sums) in windows.all().chunks(BLOCK).zip(&mut self.scores) {
+            sums.fill(0.0);
+            for row in rows {
+                for k in 0..SPAN {
+                    sums[k] += row[k];
+                }
+            }
+            let scale = 1.0 / single(rows.len());
+            sums.iter_mut().for_each(|sum| *sum *= scale);
+        }
+        for block in 0..count {
+            let (before, after) = (block.saturating_sub(1), (block + 1).min(count - 1));
+            let mut totals = [0.0; SPAN + 1];
+            for k in 0..SPAN {
+                let mean = 0.25 * (self.scores[before][k] + self.scores[after][k])
+                    + 0.5 * self.scores[block][k];
+                totals[k + 1] = totals[k] + mean;
+            }
+            let out = &mut self.steps[block];
+            out.fill(0.0);
+            for k in reach..SPAN - reach {
+                let step = totals[k + reach] - 2.0 * totals[k] + totals[k - reach];
+                out[k] = step / single(reach);
+            }
+        }
+    }
+
+    /// The course with the largest sum of steps less the cost of running aside.
+    #[inline(always)]
+    fn link(&mut self, inside: std::ops::Range<usize>) -> Option<()> {
+        let most = |steps: &Row| steps[inside.clone()].iter().fold(0.0, |a: f32, &b| a.max(b));
+        self.strongest.clear();
+        self.strongest.extend(self.steps.iter().map(most));
+        let rank = whole(TYPICAL * single(self.strongest.len().saturating_sub(1)));
+        let typical = rank::at(&mut self.strongest, rank).filter(|&step| step > 0.0)?;
+        let count = self.steps.len();
+        self.froms.resize(count, [0; SPAN]);
+        for block in 0..count {
+            for k in inside.clone() {
+                let step = self.steps[block][k] / typical;
+                let (best, from) = if block == 0 {
+                    (0.0, MAX_ASIDE)
+                } else {
+                    best_before(&self.scores[block - 1], k, &inside)
+                };
+                self.scores[block][k] = best + step;
+                self.froms[block][k] = u8::try_from(from).unwrap_or(u8::MAX);
+            }
+        }
+        let last = self.scores.last()?;
+        let mut at = inside.clone().max_by(|&a, &b| last[a].total_cmp(&last[b]))?;
+        self.blocks.clear();
+        for block in (0..count).rev() {
+            // A step at k lies between the pixels k − 1 and k.
+            self.blocks.push(single(at) - 0.5);
+            at = (at + usize::from(self.froms[block][at])).saturating_sub(MAX_ASIDE);
+        }
+        self.blocks.reverse();
+        self.draw();
+        Some(())
+    }
+
+    /// Straight lines between the blocks' middles.
+    fn draw(&mut self) {
+        let blocks = &self.blocks;
+        self.rows.clear();
+        for number in 0..blocks.len() * BLOCK {
+            let place = (single(number) + 0.5) / single(BLOCK) - 0.5;
+            let place = place.clamp(0.0, single(blocks.len() - 1));
+            let before = whole(place.floor()).min(blocks.len() - 1);
+            let after = (before + 1).min(blocks.len() - 1);
+            let fraction = place - single(before);
+            self.rows.push(blocks[before] + fraction * (blocks[after] - blocks[before]));
+        }
+    }
+}
+
+/// Best score of the block before from which a place can be reached, and where it
+/// lies: so many pixels more than [`MAX_ASIDE`] before the place.
+#[inline(always)]
+fn best_before(scores: &Row, k: usize, inside: &std::ops::Range<usize>) -> (f32, usize) {
+    let from = inside.start.max(k.saturating_sub(MAX_ASIDE));
+    let to = inside.end.min(k + MAX_ASIDE + 1);
+    let mut best = (f32::NEG_INFINITY, MAX_ASIDE);
+    for (place, score) in (from..to).zip(&scores[from..to]) {
+        let score = score - ASIDE_COST * single(place.abs_diff(k));
+        if score > best.0 {
+            best = (score, place + MAX_ASIDE - k);
+        }
+    }
+    best
+}

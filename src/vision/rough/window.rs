@@ -1,0 +1,157 @@
+//! Rows about an edge, turned so that the bead lies at higher positions and is
+//! the brighter side, and smoothed.
+
+use super::{Scene, kernel};
+use crate::vision::curve::Curve;
+use crate::vision::number::{float, narrow};
+use crate::vision::sheet::{SPAN, Sheet};
+use crate::vision::strip::Grey;
+
+/// Pixels of a row.
+pub type Row = [f32; SPAN];
+
+/// Standard deviation of the smoothing across \[px\]: a third of a usual blur, so
+/// that it hardly widens the flank.
+const ACROSS_PX: f64 = 0.7;
+/// The same along the bead \[rows\]: what is shorter than that is texture, and the
+/// mean over the rows keeps its place.
+const ALONG_ROWS: f64 = 2.5;
+/// Rows from which on two are taken together: there are plenty.
+const MANY_ROWS: usize = 400;
+
+/// The rows of one edge.
+#[derive(Debug, Clone, Default)]
+pub struct Windows {
+    sheet: Sheet,
+    rows: Vec<Row>,
+    across: Vec<Row>,
+    bead_after: bool,
+    /// Columns of the gauge.
+    width: f32,
+    kernels: [Vec<f32>; 2],
+}
+
+impl Windows {
+    /// Number of rows.
+    pub fn count(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// The smoothed pixels of a row \[grey levels\], dark beads negated.
+    pub fn row(&self, number: usize) -> &Row {
+        &self.rows[number]
+    }
+
+    /// All of them.
+    pub fn all(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// Caliper line of a row.
+    pub fn line(&self, number: usize) -> usize {
+        self.sheet.windows()[number].line
+    }
+
+    /// Rows of the gauge that a row is the mean of.
+    pub fn rows(&self, number: usize) -> f64 {
+        self.sheet.windows()[number].rows.into()
+    }
+
+    /// Position across the gauge of a position in a row's window \[px\]; `None`
+    /// where it is not a number or beyond the gauge.
+    pub fn position(&self, number: usize, at: f32) -> Option<f64> {
+        if !at.is_finite() {
+            return None;
+        }
+        let first = self.first(number);
+        let last = narrow(float(SPAN - 1));
+        let at = if self.bead_after { first + at } else { first + last - at };
+        (0.0..=self.width - 1.0).contains(&at).then(|| at.into())
+    }
+
+    /// Sum of the squares of the smoothing's weights across.
+    pub fn noise_gain(&self) -> f64 {
+        let kernel = &self.kernels[0];
+        let square = |weight: &f32| f64::from(*weight).powi(2);
+        2.0 * kernel.iter().map(square).sum::<f64>() - square(&kernel[0])
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
+    fn first(&self, number: usize) -> f32 {
+        self.sheet.windows()[number].first as f32
+    }
+
+    /// Reads the rows along a course.
+    #[inline(always)]
+    pub fn read<T: Grey>(&mut self, scene: &Scene<'_, T>, course: &Curve) {
+        if self.kernels[0].is_empty() {
+            self.kernels = [kernel(ACROSS_PX), kernel(ALONG_ROWS)];
+        }
+        let strip = scene.strip;
+        let reach = float(strip.along) / 2.0;
+        let together = if strip.along > MANY_ROWS { 2 } else { 1 };
+        let at = |v: f32| {
+            let t = (f64::from(v) + 0.5) / reach - 1.0;
+            [narrow(course.at(t)), 0.0, 1.0]
+        };
+        self.sheet.read(strip, scene.lines, (0.3, together), at);
+        self.bead_after = scene.bead_after;
+        self.width = narrow(float(strip.across));
+        let sign = if scene.bright { 1.0 } else { -1.0 };
+        let count = self.sheet.windows().len();
+        self.across.resize(count, [0.0; SPAN]);
+        self.rows.resize(count, [0.0; SPAN]);
+        for (number, row) in self.across.iter_mut().enumerate() {
+            let pixels = self.sheet.pixels(number);
+            let mut turned = [0.0; SPAN];
+            for (k, value) in turned.iter_mut().enumerate() {
+                let from = if scene.bead_after { k } else { SPAN - 1 - k };
+                *value = sign * pixels[from];
+            }
+            smooth_row(&turned, &self.kernels[0], row);
+        }
+        smooth_along(&self.across, &self.kernels[1], &mut self.rows);
+    }
+}
+
+/// Convolves a row with a symmetric kernel; beyond the ends the last pixel goes on.
+#[inline(always)]
+fn smooth_row(row: &Row, kernel: &[f32], out: &mut Row) {
+    const PAD: usize = 4;
+    let mut padded = [0.0; SPAN + 2 * PAD];
+    padded[..PAD].fill(row[0]);
+    padded[PAD..PAD + SPAN].copy_from_slice(row);
+    padded[PAD + SPAN..].fill(row[SPAN - 1]);
+    for (out, value) in out.iter_mut().zip(row) {
+        *out = kernel[0] * value;
+    }
+    for (offset, weight) in kernel.iter().enumerate().skip(1).take(PAD) {
+        for k in 0..SPAN {
+            out[k] += weight * (padded[PAD + k - offset] + padded[PAD + k + offset]);
+        }
+    }
+}
+
+/// Convolves along the bead. Beyond the ends the rows come again in reverse, so
+/// that each row weighs as much as any other in the mean of all.
+#[inline(always)]
+fn smooth_along(rows: &[Row], kernel: &[f32], out: &mut [Row]) {
+    let count = rows.len().cast_signed();
+    let mirrored = |v: isize| {
+        let v = if v < 0 { -1 - v } else { v };
+        let v = if v >= count { 2 * count - 1 - v } else { v };
+        v.clamp(0, count - 1).unsigned_abs()
+    };
+    for (number, out) in (0..).zip(out.iter_mut()) {
+        let row = &rows[mirrored(number)];
+        for k in 0..SPAN {
+            out[k] = kernel[0] * row[k];
+        }
+        for (offset, &weight) in (0..).zip(kernel).skip(1) {
+            let (one, other) = (&rows[mirrored(number - offset)], &rows[mirrored(number + offset)]);
+            for k in 0..SPAN {
+                out[k] += weight * (one[k] + other[k]);
+            }
+        }
+    }
+}
