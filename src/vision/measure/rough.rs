@@ -63,6 +63,6 @@ pub fn may_be_rough(reject: &Reject) -> bool {
             | Reject::LowContrast { .. }
             | Reject::WidthOutOfRange { .. }
             | Reject::Scattered { .. }
-            | Reject::Unsure { .. }
+            | Reject::Occluded { .. }
     )
 }
