@@ -1,153 +1,219 @@
-//! The search for the bead at a coarse scale, where texture and torn edges are
-//! small: rows and columns are averaged before steps are looked for.
+//! The search for the bead where texture and torn edges hide it from a search
+//! step by step: straight lines along which the grey steps, in the mean over the
+//! whole gauge (a Radon transform of the step response). Texture averages out;
+//! an edge does not.
 
-use super::contour::{Contour, Contours};
-use super::edge::{Candidates, REACH, respond};
-use super::number::{float, narrow, single};
-use super::pair::{self, Pair, Search};
+use super::number::single;
+use super::rank;
+use super::rough::whole;
 use super::strip::{Grey, Strip};
 
 /// Rows of a band at least, and bands at most.
-const BAND_ROWS: usize = 12;
+const BAND_ROWS: usize = 8;
 const MAX_BANDS: usize = 24;
-/// Columns that are averaged, as a fraction of the bead's width: with [`REACH`]
-/// of them on either side a step is seen over a sixteenth of the width.
-const STEP_FRACTION: f32 = 0.015;
-/// Most such columns.
-const MAX_STEP: usize = 4;
-/// Fraction of the bands from which a contour is looked at.
-const MIN_CONTOUR: f64 = 0.4;
-/// Units of a profile for a grey level.
-const UNITS: f32 = 16.0;
+/// Pixels on either side that are compared for a step, as a fraction of the
+/// bead's width, and their limits: about the depth of tears, and no more than a
+/// groove and its flank.
+const REACH_FRACTION: f32 = 0.04;
+const REACH_PX: (f32, f32) = (2.0, 6.0);
+/// Largest slope of an edge against the gauge's axis: 20 degrees.
+const MAX_SLOPE: f32 = 0.364;
+/// Distance of neighbouring slopes, as a shift between the ends of the gauge
+/// \[px\].
+const SLOPE_STEP_PX: f32 = 3.0;
+/// Rank of the bands' strongest steps above which a step counts for no more: a
+/// spark is no edge.
+const CAP_RANK: f32 = 0.7;
+/// Lines of each sign that are looked at.
+const MAX_LINES: usize = 8;
+/// Difference of slope at which a pair of lines counts for 1/e.
+const SLOPE_DIFFERENCE: f32 = 0.2;
 
-/// Contours at a coarse scale; keeps its memory from frame to frame.
-#[derive(Debug, Clone, Default)]
-pub struct Coarse {
-    /// Columns that are averaged.
-    step: usize,
-    bounds: Vec<(usize, usize)>,
-    sums: Vec<f32>,
-    profile: Vec<u16>,
-    response: Vec<i16>,
-    candidates: Vec<Candidates>,
-    ups: Contours,
-    downs: Contours,
-    memory: Vec<f32>,
+/// A line along which the grey steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepLine {
+    /// Position across the bead in the middle of the gauge \[px\].
+    pub at: f32,
+    /// Change of the position for each row.
+    pub slope: f32,
+    /// Mean step across it \[grey levels\], positive.
+    pub step: f32,
 }
 
-/// A bead's two edges at the coarse scale.
-#[derive(Debug, Clone, Copy)]
-pub struct CoarsePair<'a> {
-    coarse: &'a Coarse,
-    pair: Pair,
+/// Two lines that may be the edges of a bead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinePair {
+    /// Left (upper) and right (lower) edge.
+    pub sides: [StepLine; 2],
     /// Whether the bead is brighter than what lies outside.
     pub bright: bool,
+    /// How strong the pair is \[grey levels\].
+    pub score: f32,
+}
+
+impl LinePair {
+    /// Distance of the two lines in the middle of the gauge \[px\].
+    pub fn width_px(&self) -> f32 {
+        self.sides[1].at - self.sides[0].at
+    }
+}
+
+/// The search; keeps its memory from frame to frame.
+#[derive(Debug, Clone, Default)]
+pub struct Coarse {
+    /// Steps of each band, and its middle row about the gauge's.
+    steps: Vec<f32>,
+    middles: Vec<f32>,
+    across: usize,
+    totals: Vec<f32>,
+    strongest: Vec<f32>,
+    /// Mean step of every line: positions by slopes.
+    means: Vec<f32>,
+    slopes: Vec<f32>,
+    ups: Vec<StepLine>,
+    downs: Vec<StepLine>,
 }
 
 impl Coarse {
-    /// Looks for contours. `width_px` is a usual width, `min_step` the lowest step
-    /// that counts \[grey levels\].
+    /// Looks for lines. `width_px` is a usual width of the bead.
     #[inline(always)]
-    pub fn look<T: Grey>(&mut self, strip: &Strip<'_, T>, width_px: f32, min_step: f32) {
-        self.step = super::rough::whole(STEP_FRACTION * width_px).clamp(1, MAX_STEP);
+    pub fn look<T: Grey>(&mut self, strip: &Strip<'_, T>, width_px: f32) {
+        let reach = whole((REACH_FRACTION * width_px).clamp(REACH_PX.0, REACH_PX.1));
+        self.respond(strip, reach);
+        self.cap();
+        self.project(strip.along);
+        self.ups.clear();
+        self.downs.clear();
+        strongest_lines(&self.means, &self.slopes, self.across, reach, 1.0, &mut self.ups);
+        strongest_lines(&self.means, &self.slopes, self.across, reach, -1.0, &mut self.downs);
+    }
+
+    /// Pairs of lines at a distance within a range, the strongest first.
+    /// `polarities` are whether bright and dark beads are looked for.
+    pub fn pairs(&self, width_px: (f32, f32), polarities: [bool; 2], out: &mut Vec<LinePair>) {
+        out.clear();
+        for (bright, wanted) in [(true, polarities[0]), (false, polarities[1])] {
+            if !wanted {
+                continue;
+            }
+            let (lefts, rights) =
+                if bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
+            for &left in lefts {
+                for &right in rights {
+                    let width = right.at - left.at;
+                    if width < width_px.0 || width > width_px.1 {
+                        continue;
+                    }
+                    let apart = (left.slope - right.slope) / SLOPE_DIFFERENCE;
+                    let score = (left.step * right.step).sqrt() * (-apart * apart).exp();
+                    out.push(LinePair { sides: [left, right], bright, score });
+                }
+            }
+        }
+        out.sort_by(|a, b| b.score.total_cmp(&a.score));
+    }
+
+    /// Steps of the bands' mean profiles.
+    #[inline(always)]
+    fn respond<T: Grey>(&mut self, strip: &Strip<'_, T>, reach: usize) {
         let count = (strip.along / BAND_ROWS).clamp(1, MAX_BANDS);
-        self.bounds.clear();
-        self.bounds
-            .extend((0..count).map(|k| (k * strip.along / count, (k + 1) * strip.along / count)));
-        self.candidates.resize(count, Candidates::default());
+        self.across = strip.across;
+        self.steps.clear();
+        self.steps.resize(count * strip.across, 0.0);
+        self.middles.clear();
         for band in 0..count {
-            self.pool(strip, self.bounds[band]);
-            self.response.resize(self.profile.len(), 0);
-            respond(&self.profile, &mut self.response);
-            self.candidates[band].find(&self.response, min_step, 1.0 / (UNITS * single(REACH)));
+            let (from, to) = (band * strip.along / count, (band + 1) * strip.along / count);
+            self.middles.push(0.5 * (single(from + to) - single(strip.along)));
+            let steps = &mut self.steps[band * strip.across..][..strip.across];
+            for v in from..to {
+                for (sum, &value) in steps.iter_mut().zip(strip.row(v)) {
+                    *sum += T::float(value.add_to(T::Sum::default()));
+                }
+            }
+            let scale = strip.scale / single((to - from) * reach);
+            self.totals.clear();
+            self.totals.push(0.0);
+            let mut total = 0.0;
+            self.totals.extend(steps.iter().map(|sum| {
+                total += scale * sum;
+                total
+            }));
+            steps.fill(0.0);
+            for u in reach..strip.across.saturating_sub(reach) {
+                let (before, after) = (self.totals[u - reach], self.totals[u + reach]);
+                steps[u] = after - 2.0 * self.totals[u] + before;
+            }
         }
-        let band_px = single(strip.along) / single(count * self.step);
-        self.ups.search(&self.candidates, true, band_px, MIN_CONTOUR);
-        self.downs.search(&self.candidates, false, band_px, MIN_CONTOUR);
     }
 
-    /// Mean of a band's rows, a few columns together.
+    /// Caps steps at what most bands have.
+    fn cap(&mut self) {
+        let most = |steps: &[f32]| steps.iter().fold(0.0, |most: f32, step| most.max(step.abs()));
+        self.strongest.clear();
+        self.strongest.extend(self.steps.chunks(self.across).map(most));
+        let rank = whole(CAP_RANK * single(self.strongest.len() - 1));
+        let cap = rank::at(&mut self.strongest, rank).unwrap_or(f32::INFINITY);
+        for step in &mut self.steps {
+            *step = step.clamp(-cap, cap);
+        }
+    }
+
+    /// Means of the steps along lines.
     #[inline(always)]
-    fn pool<T: Grey>(&mut self, strip: &Strip<'_, T>, (from, to): (usize, usize)) {
-        self.sums.clear();
-        self.sums.resize(strip.across, 0.0);
-        for v in from..to {
-            for (sum, &value) in self.sums.iter_mut().zip(strip.row(v)) {
-                *sum += T::float(value.add_to(T::Sum::default()));
+    fn project(&mut self, along: usize) {
+        let most = (MAX_SLOPE * single(along) / SLOPE_STEP_PX).ceil();
+        let count = 2 * whole(most) + 1;
+        self.slopes.clear();
+        self.slopes.extend((0..count).map(|k| (single(k) - most) * SLOPE_STEP_PX / single(along)));
+        self.means.clear();
+        self.means.resize(count * self.across, 0.0);
+        let scale = 1.0 / single(self.middles.len());
+        for (slope, means) in self.slopes.iter().zip(self.means.chunks_mut(self.across)) {
+            for (steps, middle) in self.steps.chunks(self.across).zip(&self.middles) {
+                let aside = shift(slope * middle);
+                let most = self.across.saturating_sub(aside.unsigned_abs());
+                let (into, from) = if aside >= 0 {
+                    (&mut means[..most], &steps[self.across - most..])
+                } else {
+                    (&mut means[self.across - most..], &steps[..most])
+                };
+                for (mean, step) in into.iter_mut().zip(from) {
+                    *mean += scale * step;
+                }
             }
         }
-        let scale = UNITS * strip.scale / single((to - from) * self.step);
-        self.profile.clear();
-        let cells = self.sums.chunks_exact(self.step);
-        self.profile.extend(cells.map(|cell| units(scale * cell.iter().sum::<f32>())));
-    }
-
-    /// The best pair of the polarities that are looked for.
-    pub fn pair(&mut self, width_px: (f32, f32), polarities: [bool; 2]) -> Option<CoarsePair<'_>> {
-        let step = single(self.step);
-        let search = Search { width_px: (width_px.0 / step, width_px.1 / step) };
-        let mut best: Option<(Pair, bool)> = None;
-        for bright in [true, false] {
-            if !polarities[usize::from(!bright)] {
-                continue;
-            }
-            let sides = if bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
-            let Some(pair) = pair::find(sides.0, sides.1, search, &mut self.memory) else {
-                continue;
-            };
-            if best.is_none_or(|(best, _)| pair.score > best.score) {
-                best = Some((pair, bright));
-            }
-        }
-        let (pair, bright) = best?;
-        Some(CoarsePair { coarse: self, pair, bright })
     }
 }
 
-impl CoarsePair<'_> {
-    /// Places along the bead and positions across it of the left edge \[px\].
-    pub fn left(&self) -> impl Iterator<Item = (f64, f64)> + Clone {
-        let side = if self.bright { &self.coarse.ups } else { &self.coarse.downs };
-        self.places(&side.all()[self.pair.left])
-    }
-
-    /// Those of the right edge.
-    pub fn right(&self) -> impl Iterator<Item = (f64, f64)> + Clone {
-        let side = if self.bright { &self.coarse.downs } else { &self.coarse.ups };
-        self.places(&side.all()[self.pair.right])
-    }
-
-    fn places<'a>(
-        &self,
-        contour: &'a Contour,
-    ) -> impl Iterator<Item = (f64, f64)> + Clone + use<'a, '_> {
-        let step = float(self.coarse.step);
-        let bounds = self.coarse.bounds.iter();
-        bounds.zip(&contour.at).filter_map(move |(&(from, to), at)| {
-            let at = f64::from((*at)?);
-            Some((float(from + to - 1) / 2.0, (at + 0.5) * step - 0.5))
-        })
-    }
-
-    /// Distance of the two edges in the mean \[px\].
-    pub fn width_px(&self) -> f32 {
-        let mean = |places: &mut dyn Iterator<Item = (f64, f64)>| {
-            let (mut sum, mut n) = (0.0, 0.0);
-            for (_, at) in places {
-                sum += at;
-                n += 1.0;
+/// The strongest lines of a sign, each at least `reach` from the others.
+fn strongest_lines(
+    means: &[f32],
+    slopes: &[f32],
+    across: usize,
+    reach: usize,
+    sign: f32,
+    out: &mut Vec<StepLine>,
+) {
+    // The best slope of every position.
+    let mut best: Vec<(f32, usize)> = vec![(0.0, 0); across];
+    for (number, means) in means.chunks(across).enumerate() {
+        for (best, mean) in best.iter_mut().zip(means) {
+            if sign * mean > best.0 {
+                *best = (sign * mean, number);
             }
-            sum / f64::max(n, 1.0)
-        };
-        narrow(mean(&mut self.right()) - mean(&mut self.left()))
+        }
+    }
+    while out.len() < MAX_LINES {
+        let strongest = best.iter().enumerate().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let Some((at, &(step, slope))) = strongest.filter(|(_, best)| best.0 > 0.0) else { return };
+        out.push(StepLine { at: single(at) - 0.5, slope: slopes[slope], step });
+        let near = at.saturating_sub(reach)..(at + reach + 1).min(across);
+        best[near].fill((0.0, 0));
     }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a grey level of at most 256 in sixteenths"
-)]
-fn units(value: f32) -> u16 {
-    value as u16
+/// A shift by whole pixels.
+fn shift(aside: f32) -> isize {
+    let size = whole(aside.abs()).cast_signed();
+    if aside < 0.0 { -size } else { size }
 }

@@ -14,7 +14,7 @@ use crate::geometry::ImagePoint;
 use rough::may_be_rough;
 
 use super::axis;
-use super::coarse::Coarse;
+use super::coarse::{Coarse, LinePair};
 use super::contour::Contours;
 use super::edge::Candidates;
 use super::edge_lines;
@@ -59,6 +59,7 @@ struct Work {
     downs: Contours,
     parallel: Parallel,
     coarse: Coarse,
+    pairs: Vec<LinePair>,
     rough: [RoughEdge; 2],
     left: Tracer,
     right: Tracer,
@@ -90,6 +91,7 @@ impl Measurer {
             downs: Contours::default(),
             parallel: Parallel::default(),
             coarse: Coarse::default(),
+            pairs: Vec::new(),
             rough: Default::default(),
             left: Tracer::default(),
             right: Tracer::default(),
@@ -237,7 +239,7 @@ impl Work {
         self.find_candidates();
         let pair = self.find_pair(range)?;
         self.trace(strip, pair)?;
-        self.sort_out()?;
+        self.sort_out(pair.bright)?;
         self.check_contrast()?;
         self.check_border(strip.across)?;
         self.width_on(view, surface)

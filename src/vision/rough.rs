@@ -19,12 +19,11 @@ mod noise;
 mod route;
 mod window;
 
-use super::curve::{Curve, Point};
+use super::coarse::StepLine;
 use super::number::{float, narrow};
-use super::rank;
 use super::strip::{Grey, Strip};
 use super::trace::Located;
-use levels::Levels;
+use levels::{Crossings, Levels};
 use route::Route;
 use window::Windows;
 
@@ -33,9 +32,6 @@ use window::Windows;
 const ROUNDS: usize = 2;
 /// Fraction of the rows of a caliper line that must show the edge.
 const MIN_ROWS_FRACTION: f64 = 0.5;
-/// Points of the coarse course farther from it than so many median distances do
-/// not belong to it.
-const OUTLIER_MEDIANS: f64 = 4.0;
 
 /// What is looked at.
 #[derive(Debug, Clone, Copy)]
@@ -60,10 +56,8 @@ pub struct RoughEdge {
     windows: Windows,
     route: Route,
     levels: Levels,
-    /// Position in each row's window \[px\]; not a number where there is none.
-    crossings: Vec<f32>,
+    crossings: Crossings,
     lines: Vec<Option<Located>>,
-    distances: Vec<f64>,
 }
 
 /// What was found of an edge.
@@ -85,52 +79,30 @@ impl RoughEdge {
         &self.lines
     }
 
-    /// Finds the edge near rough positions, given as place along the bead and
-    /// position across it \[px\]; `None` where no edge runs there.
+    /// Finds the edge near a line; `None` where no edge runs there.
     #[inline(always)]
-    pub fn find<T: Grey>(
-        &mut self,
-        scene: &Scene<'_, T>,
-        rough: impl Iterator<Item = (f64, f64)> + Clone,
-    ) -> Option<RoughFit> {
-        let course = self.course(scene, rough)?;
-        self.windows.read(scene, &course);
+    pub fn find<T: Grey>(&mut self, scene: &Scene<'_, T>, line: &StepLine) -> Option<RoughFit> {
+        self.windows.read(scene, line);
         self.route.find(&self.windows, scene.width_px)?;
         for _ in 0..ROUNDS {
             self.levels.read(&self.windows, self.route.rows(), scene.width_px)?;
             self.levels.cross(&self.windows, self.route.rows(), &mut self.crossings);
-            self.route.follow(&self.crossings)?;
+            self.route.follow(&self.crossings.at)?;
         }
-        let noise = noise::of_mean(&self.windows, &self.levels, scene)?;
+        let noise = noise::of_mean(&self.windows, &self.levels, &self.crossings, scene)?;
         self.gather(scene, noise.of_row);
-        let seen = self.crossings.iter().filter(|at| at.is_finite()).count();
+        let seen = self.crossings.at.iter().filter(|at| at.is_finite()).count();
         Some(RoughFit {
             variance: noise.of_mean,
-            rows_fraction: float(seen) / float(self.crossings.len()),
+            rows_fraction: float(seen) / float(self.crossings.at.len()),
             contrast: self.levels.contrast(),
             blur_px: noise.blur_px,
         })
     }
 
-    /// A smooth course through the rough positions.
-    fn course<T: Grey>(
-        &mut self,
-        scene: &Scene<'_, T>,
-        rough: impl Iterator<Item = (f64, f64)> + Clone,
-    ) -> Option<Curve> {
-        let reach = float(scene.strip.along) / 2.0;
-        let points = rough.map(|(v, u)| Point { t: (v + 0.5) / reach - 1.0, u, weight: 1.0 });
-        let first = Curve::fit(points.clone(), reach)?;
-        let off = |point: &Point| (point.u - first.at(point.t)).abs();
-        self.distances.clear();
-        self.distances.extend(points.clone().map(|point| off(&point)));
-        let limit = OUTLIER_MEDIANS * rank::median(&mut self.distances)?.max(0.5);
-        Curve::fit(points.filter(|point| off(point) <= limit), reach)
-    }
-
     /// Positions of the caliper lines from those of their rows.
     fn gather<T: Grey>(&mut self, scene: &Scene<'_, T>, variance_of_row: f64) {
-        let (windows, crossings) = (&self.windows, &self.crossings);
+        let (windows, crossings) = (&self.windows, &self.crossings.at);
         let height = self.levels.contrast();
         self.lines.clear();
         let mut next = 0;

@@ -52,7 +52,8 @@ impl Work {
     }
 
     /// Takes out calipers that disagree with their neighbours, on either edge.
-    pub(super) fn sort_out(&mut self) -> Result<(), Reject> {
+    pub(super) fn sort_out(&mut self, bright: bool) -> Result<(), Reject> {
+        self.drop_contradictions(bright);
         let mut worst: f64 = 0.0;
         for side in [&mut self.left, &mut self.right] {
             if side.is_covered() {
@@ -73,6 +74,25 @@ impl Work {
             return Err(Reject::NoPair { got, need });
         }
         Ok(())
+    }
+
+    /// Takes out places that step the wrong way for the bead's polarity, and lines
+    /// whose two edges cross.
+    fn drop_contradictions(&mut self, bright: bool) {
+        let sides = [(&mut self.left, bright), (&mut self.right, !bright)];
+        for (side, steps_up) in sides {
+            for edge in side.edges_mut() {
+                *edge = edge.take_if(|edge| (edge.height > 0.0) == steps_up);
+            }
+        }
+        let (left, right) = (self.left.edges_mut(), self.right.edges_mut());
+        for (left, right) in left.iter_mut().zip(right) {
+            if let (Some(one), Some(other)) = (&left, &right)
+                && one.at >= other.at
+            {
+                (*left, *right) = (None, None);
+            }
+        }
     }
 
     /// Scatter of an edge from which on it is noise \[px\].

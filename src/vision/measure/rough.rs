@@ -8,9 +8,9 @@ use crate::vision::rough::Scene;
 use crate::vision::strip::{Grey, Strip, View};
 use crate::vision::width::WidthMeasurement;
 
-/// Lowest step of a coarse contour, as a fraction of the gauge's smallest
-/// contrast: the coarse scale lowers narrow grooves.
-const COARSE_STEP: f64 = 0.4;
+/// The search range allows 1.5 times too wide and too narrow single places; lines
+/// are means over the gauge, and stay nearer.
+const LINE_SLACK: f32 = 1.4;
 
 impl Work {
     /// Measures a bead by where its rows pass half height.
@@ -24,12 +24,12 @@ impl Work {
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
         let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
-        #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
-        let min_step = (COARSE_STEP * self.gauge.min_contrast_grey) as f32;
-        self.coarse.look(strip, (range.0 * range.1).sqrt(), min_step);
+        let range = (LINE_SLACK * range.0, range.1 / LINE_SLACK);
+        self.coarse.look(strip, (range.0 * range.1).sqrt());
         let polarities =
             [self.gauge.polarity != Polarity::Dark, self.gauge.polarity != Polarity::Bright];
-        let pair = self.coarse.pair(range, polarities).ok_or(failed)?;
+        self.coarse.pairs(range, polarities, &mut self.pairs);
+        let pair = *self.pairs.first().ok_or(failed)?;
         let scene = Scene {
             strip,
             lines: &self.lines,
@@ -39,9 +39,9 @@ impl Work {
             bright: pair.bright,
         };
         let [left, right] = &mut self.rough;
-        let left_fit = left.find(&scene, pair.left()).ok_or(failed)?;
+        let left_fit = left.find(&scene, &pair.sides[0]).ok_or(failed)?;
         let right_scene = Scene { bead_after: false, ..scene };
-        let right_fit = right.find(&right_scene, pair.right()).ok_or(failed)?;
+        let right_fit = right.find(&right_scene, &pair.sides[1]).ok_or(failed)?;
         let got = left_fit.rows_fraction.min(right_fit.rows_fraction);
         if got < NEED_SHARE {
             return Err(Reject::NoPair { got, need: NEED_SHARE });

@@ -1,6 +1,7 @@
 //! Grey levels on either side of an edge, along its course, and where each row
 //! passes half way between them.
 
+use super::crossing::{self, Flank};
 use super::kernel;
 use super::route::BLOCK;
 use super::whole;
@@ -23,6 +24,8 @@ pub const LENGTH: usize = OUTSIDE + 30;
 const ALONG_ROWS: f64 = 24.0;
 /// Fraction of the step within which a place outside is as dark as the darkest.
 const SAME: f32 = 0.1;
+/// How far inside its course an edge may be torn \[px\].
+const DEEPEST_PX: f32 = 25.0;
 /// As many such places in a row are ground; fewer are a groove.
 const GROUND_PX: usize = 8;
 
@@ -37,6 +40,15 @@ pub struct Levels {
     levels: Vec<BlockLevels>,
     mean: Option<MeanProfile>,
     kernel: Vec<f32>,
+}
+
+/// What the rows show of an edge, one value a row.
+#[derive(Debug, Clone, Default)]
+pub struct Crossings {
+    /// Position in the row's window \[px\]; not a number where there is none.
+    pub at: Vec<f32>,
+    /// Length of the flank \[px\], likewise.
+    pub flank: Vec<f32>,
 }
 
 /// Levels about one block of rows.
@@ -116,7 +128,9 @@ impl Levels {
                 }
             }
             let scale = 1.0 / single(rows.len());
-            sums.iter_mut().for_each(|sum| *sum *= scale);
+            for sum in &mut sums {
+                *sum *= scale;
+            }
             self.blocks.push(sums);
         }
     }
@@ -138,22 +152,31 @@ impl Levels {
                     out[k] += weight * profile[k];
                 }
             }
-            out.iter_mut().for_each(|value| *value /= total);
+            for value in out.iter_mut() {
+                *value /= total;
+            }
         }
     }
 
-    /// Where each row passes half way between its levels, from outside: what is
-    /// torn open to the outside is not bead. Not a number where it does not.
+    /// Where each row passes from outside to the bead, and how long its flank is
+    /// \[px\]; not numbers where it does not.
     #[inline(always)]
-    pub fn cross(&self, windows: &Windows, course: &[f32], crossings: &mut Vec<f32>) {
-        crossings.clear();
-        let on_ground = self.mean.is_some_and(|mean| mean.on_ground);
+    pub fn cross(&self, windows: &Windows, course: &[f32], out: &mut Crossings) {
+        out.at.clear();
+        out.flank.clear();
+        let ground = self.mean.filter(|mean| mean.on_ground).map(|mean| mean.outside.1 - 1);
         for (number, (row, &at)) in windows.all().iter().zip(course).enumerate() {
             let levels = self.between(number);
-            let start =
-                if on_ground { at - 1.0 } else { at + single(levels.darkest) - single(OUTSIDE) };
-            let half = 0.5 * (levels.outside + levels.inside);
-            crossings.push(super::crossing::of(row, start, half).unwrap_or(f32::NAN));
+            let start = ground.unwrap_or(levels.darkest);
+            let flank = Flank {
+                start: at + single(start) - single(OUTSIDE),
+                outside: levels.outside,
+                inside: levels.inside,
+                end: at + DEEPEST_PX,
+            };
+            let found = crossing::of(row, &flank);
+            out.at.push(found.map_or(f32::NAN, |found| found.at));
+            out.flank.push(found.map_or(f32::NAN, |found| found.flank));
         }
     }
 

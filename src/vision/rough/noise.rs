@@ -1,13 +1,16 @@
 //! How far pixel noise and texture move the mean position of an edge.
 
 use super::Scene;
-use super::levels::{LENGTH, Levels, OUTSIDE, Profile};
+use super::levels::{Crossings, LENGTH, Levels, OUTSIDE, Profile};
 use super::window::Windows;
 use crate::vision::number::float;
 use crate::vision::strip::Grey;
 
 /// Blocks over which texture is taken to be correlated at most.
 const MAX_LAG: usize = 6;
+/// Fraction of the irregular length of a flank by which an edge may lie elsewhere
+/// in it: half, were the flank an even ramp.
+const FLANK_FRACTION: f64 = 0.25;
 /// √(2π): the slope of a Gaussian flank is its height over that and its blur.
 const ROOT_TWO_PI: f64 = 2.506_628_274_631_000_5;
 
@@ -23,7 +26,12 @@ pub struct Noise {
 }
 
 /// Variance of the mean position; `None` where the flank has no slope.
-pub fn of_mean<T: Grey>(windows: &Windows, levels: &Levels, scene: &Scene<'_, T>) -> Option<Noise> {
+pub fn of_mean<T: Grey>(
+    windows: &Windows,
+    levels: &Levels,
+    crossings: &Crossings,
+    scene: &Scene<'_, T>,
+) -> Option<Noise> {
     let mean = levels.mean()?;
     let slope = slope(&mean.grey);
     if slope <= 0.0 {
@@ -39,7 +47,8 @@ pub fn of_mean<T: Grey>(windows: &Windows, levels: &Levels, scene: &Scene<'_, T>
     };
     // At half height a pixel shows as much of the bead as of what lies outside.
     let grey = pixel + 0.25 * (half_in + half_out);
-    let of_mean = grey / (slope * slope);
+    let of_flank = FLANK_FRACTION * FLANK_FRACTION * irregularity(&crossings.flank);
+    let of_mean = grey / (slope * slope) + of_flank;
     Some(Noise {
         of_mean,
         of_row: of_mean * rows,
@@ -76,4 +85,31 @@ fn texture(levels: &Levels, (from, to): (usize, usize), level: impl Fn(usize) ->
         sum += 2.0 * covariance;
     }
     sum / columns / float(count)
+}
+
+/// Variance of the mean length of the flanks \[px²\], their correlation along the
+/// bead included: flanks that are pitted or shaded are longer in some rows.
+fn irregularity(flanks: &[f32]) -> f64 {
+    let seen = || flanks.iter().filter(|flank| flank.is_finite()).map(|&flank| f64::from(flank));
+    let count = seen().count();
+    if count == 0 {
+        return 0.0;
+    }
+    let mean = seen().sum::<f64>() / float(count);
+    let off = |row: usize| {
+        let flank = flanks[row];
+        if flank.is_finite() { f64::from(flank) - mean } else { 0.0 }
+    };
+    let covariance = |lag: usize| {
+        (lag..flanks.len()).map(|row| off(row) * off(row - lag)).sum::<f64>() / float(count)
+    };
+    let mut sum = covariance(0);
+    for lag in 1..flanks.len() / 4 {
+        let next = covariance(lag);
+        if next <= 0.0 {
+            break;
+        }
+        sum += 2.0 * next;
+    }
+    sum / float(count)
 }

@@ -91,7 +91,9 @@ impl Route {
                 }
             }
             let scale = 1.0 / single(rows.len());
-            sums.iter_mut().for_each(|sum| *sum *= scale);
+            for sum in sums.iter_mut() {
+                *sum *= scale;
+            }
         }
         for block in 0..count {
             let (before, after) = (block.saturating_sub(1), (block + 1).min(count - 1));

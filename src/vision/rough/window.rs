@@ -2,7 +2,7 @@
 //! the brighter side, and smoothed.
 
 use super::{Scene, kernel};
-use crate::vision::curve::Curve;
+use crate::vision::coarse::StepLine;
 use crate::vision::number::{float, narrow};
 use crate::vision::sheet::{SPAN, Sheet};
 use crate::vision::strip::Grey;
@@ -81,19 +81,16 @@ impl Windows {
         self.sheet.windows()[number].first as f32
     }
 
-    /// Reads the rows along a course.
+    /// Reads the rows along a line.
     #[inline(always)]
-    pub fn read<T: Grey>(&mut self, scene: &Scene<'_, T>, course: &Curve) {
+    pub fn read<T: Grey>(&mut self, scene: &Scene<'_, T>, line: &StepLine) {
         if self.kernels[0].is_empty() {
             self.kernels = [kernel(ACROSS_PX), kernel(ALONG_ROWS)];
         }
         let strip = scene.strip;
-        let reach = float(strip.along) / 2.0;
+        let middle = narrow(float(strip.along) - 1.0) / 2.0;
         let together = if strip.along > MANY_ROWS { 2 } else { 1 };
-        let at = |v: f32| {
-            let t = (f64::from(v) + 0.5) / reach - 1.0;
-            [narrow(course.at(t)), 0.0, 1.0]
-        };
+        let at = |v: f32| [line.at + line.slope * (v - middle), 0.0, 1.0];
         self.sheet.read(strip, scene.lines, (0.3, together), at);
         self.bead_after = scene.bead_after;
         self.width = narrow(float(strip.across));
