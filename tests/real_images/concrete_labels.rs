@@ -64,7 +64,7 @@ impl Sequence {
 fn middle(values: impl Iterator<Item = usize>) -> usize {
     let mut values: Vec<usize> = values.collect();
     values.sort_unstable();
-    values[values.len() / 2]
+    usize::midpoint(values[(values.len() - 1) / 2], values[values.len() / 2])
 }
 
 /// Reads a label; none where it does not show two grooves.
