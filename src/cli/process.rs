@@ -15,7 +15,9 @@ use crate::control::target::Target;
 use crate::io::camera::mcap::RobotZ;
 use crate::io::camera::open::{self, OfflineOptions};
 use crate::io::stop::StopSignal;
-use crate::offline::{EdgesWriter, FrameRow, LogOptions, Note, Progress, RunLog, Summary};
+use crate::offline::{
+    EdgesWriter, FrameRow, LogOptions, Note, OverlayWriter, Progress, RunLog, Summary,
+};
 use crate::ports::{FrameSource, Grab, SourceError};
 use crate::vision::{Measurer, Reject};
 
@@ -34,7 +36,7 @@ Examples:
   truebead process clip.mp4 --cell cell.toml --out measured/ --edges
 
 Leaves widths.csv, summary.json and report.html in the output folder, with
---edges also edges.csv. The cell needs [calibration] and [gauge] only.")]
+--edges also edges.csv, with --overlays a folder overlays/. The cell needs [calibration] and [gauge] only.")]
 pub struct ProcessArgs {
     /// Folder of images, video file or MCAP
     input: PathBuf,
@@ -53,6 +55,9 @@ pub struct ProcessArgs {
     /// Also write edges.csv: where each caliper line found the two edges
     #[arg(long)]
     edges: bool,
+    /// Also write overlays/: every frame with its gauge and edges drawn in
+    #[arg(long)]
+    overlays: bool,
 }
 
 /// Runs the command; the summary goes to standard output.
@@ -81,7 +86,10 @@ pub fn run(args: &ProcessArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     let total = recorded.source.expected_frames();
     let progress = Progress::new("measuring", "frames", total, voice.quiet);
     let edges = args.edges.then(|| EdgesWriter::create(&args.out)).transpose()?;
-    let bench = Bench { loaded: &loaded, robot_z: recorded.robot_z.as_ref(), progress, log, edges };
+    let overlays = args.overlays.then(|| OverlayWriter::create(&args.out, loaded.cell.gauge));
+    let overlays = overlays.transpose()?;
+    let robot_z = recorded.robot_z.as_ref();
+    let bench = Bench { loaded: &loaded, robot_z, progress, log, edges, overlays };
     let summary = bench.measure_all(recorded.source, &stop)?;
     Ok(conclude(args, &summary, &loaded))
 }
@@ -97,6 +105,7 @@ struct Bench<'a> {
     progress: Progress,
     log: RunLog,
     edges: Option<EdgesWriter>,
+    overlays: Option<OverlayWriter>,
 }
 
 impl Bench<'_> {
@@ -159,6 +168,9 @@ impl Bench<'_> {
                     .map_err(|reject| reject.status());
                 let row = FrameRow { frame: frame.seq, time_s, outcome, control: None };
                 self.log.frame(&row, Some(&frame), Some(measurer.edges()))?;
+                if let Some(overlays) = &self.overlays {
+                    overlays.frame(&frame, measurer.edges(), outcome)?;
+                }
                 if let Some(edges) = &mut self.edges {
                     edges.frame(frame.seq, measurer.calipers())?;
                 }
