@@ -58,14 +58,17 @@ fn name(frame: u64, outcome: Result<WidthMeasurement, &'static str>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::Pixels;
     use crate::offline::synthetic;
+    use crate::time::Stamp;
     use crate::vision::Reject;
 
     #[test]
     fn every_frame_has_an_overlay_that_is_named_after_what_was_found() {
         let folder = tempfile::tempdir().unwrap();
         let writer = OverlayWriter::create(folder.path(), synthetic::gauge()).unwrap();
-        let frame = synthetic::frame(7);
+        let pixels = Pixels::Grey8(vec![40; 720 * 540]);
+        let frame = Frame::new(7, Stamp::START, (720, 540), pixels).unwrap();
         let none = Edges { left: &[], right: &[] };
         writer.frame(&frame, none, Err(Reject::OffSurface.status())).unwrap();
         let file = folder.path().join("overlays/000007_off_surface.png");

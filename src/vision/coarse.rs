@@ -139,9 +139,9 @@ impl Coarse {
                 total
             }));
             steps.fill(0.0);
-            for u in reach..strip.across.saturating_sub(reach) {
-                let (before, after) = (self.totals[u - reach], self.totals[u + reach]);
-                steps[u] = after - 2.0 * self.totals[u] + before;
+            let totals = self.totals.windows(2 * reach + 1);
+            for (step, totals) in steps.iter_mut().skip(reach).zip(totals) {
+                *step = totals[2 * reach] - 2.0 * totals[reach] + totals[0];
             }
         }
     }

@@ -62,7 +62,7 @@ fn no_width_of_a_whole_image_has_a_useless_sigma() {
                     let Ok(found) = measure(gauge, frame) else { continue };
                     let fraction = found.sigma.get() / found.width.get();
                     fractions.push(fraction);
-                    if !(fraction <= gauge.max_sigma) {
+                    if fraction.is_nan() || fraction > gauge.max_sigma {
                         useless += 1;
                         println!("useless: {name} {axis:?} {polarity:?}: {found:?}");
                     }

@@ -37,7 +37,7 @@ pub type Profile = [f32; LENGTH];
 pub struct Levels {
     blocks: Vec<Profile>,
     smooth: Vec<Profile>,
-    levels: Vec<BlockLevels>,
+    beside: Vec<BlockLevels>,
     mean: Option<MeanProfile>,
     kernel: Vec<f32>,
 }
@@ -76,8 +76,8 @@ pub struct MeanProfile {
 impl Levels {
     /// Step from outside to the bead in the mean \[grey levels\].
     pub fn contrast(&self) -> f64 {
-        let sum: f32 = self.levels.iter().map(|levels| levels.inside - levels.outside).sum();
-        f64::from(sum) / float(self.levels.len().max(1))
+        let sum: f32 = self.beside.iter().map(|levels| levels.inside - levels.outside).sum();
+        f64::from(sum) / float(self.beside.len().max(1))
     }
 
     /// The profile of the whole edge.
@@ -92,12 +92,12 @@ impl Levels {
 
     /// Level inside at a block \[grey levels\].
     pub fn inside(&self, block: usize) -> f32 {
-        self.levels[block].inside
+        self.beside[block].inside
     }
 
     /// Level outside at a block \[grey levels\].
     pub fn outside(&self, block: usize) -> f32 {
-        self.levels[block].outside
+        self.beside[block].outside
     }
 
     /// Reads the levels along a course; `None` where there is no step.
@@ -109,8 +109,8 @@ impl Levels {
         self.align(windows, course);
         self.smooth_blocks();
         let mean = mean_profile(&self.blocks, width_px)?;
-        self.levels.clear();
-        self.levels.extend(self.smooth.iter().map(|profile| block_levels(profile, &mean)));
+        self.beside.clear();
+        self.beside.extend(self.smooth.iter().map(|profile| block_levels(profile, &mean)));
         self.mean = Some(mean);
         (self.contrast() > 0.0).then_some(())
     }
@@ -182,10 +182,10 @@ impl Levels {
 
     /// Levels at a row, between those of the two blocks beside it.
     fn between(&self, row: usize) -> BlockLevels {
-        let last = self.levels.len() - 1;
+        let last = self.beside.len() - 1;
         let place = ((single(row) + 0.5) / single(BLOCK) - 0.5).clamp(0.0, single(last));
         let before = whole(place.floor()).min(last);
-        let (one, other) = (self.levels[before], self.levels[(before + 1).min(last)]);
+        let (one, other) = (self.beside[before], self.beside[(before + 1).min(last)]);
         let fraction = place - single(before);
         BlockLevels {
             outside: one.outside + fraction * (other.outside - one.outside),

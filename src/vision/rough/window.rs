@@ -37,12 +37,7 @@ impl Windows {
         self.rows.len()
     }
 
-    /// The smoothed pixels of a row \[grey levels\], dark beads negated.
-    pub fn row(&self, number: usize) -> &Row {
-        &self.rows[number]
-    }
-
-    /// All of them.
+    /// The smoothed pixels of all rows \[grey levels\], dark beads negated.
     pub fn all(&self) -> &[Row] {
         &self.rows
     }
