@@ -9,7 +9,7 @@
 //! window    rows about the edge, turned so that the bead lies after it and is bright
 //! route     the course with the strongest step, by dynamic programming
 //! levels    grey of the bead and of what lies outside, along the route
-//! crossing  where each row passes half way between the two
+//! crossing  where each row passes from the one to the other
 //! noise     standard deviation of the mean position
 //! ```
 
@@ -29,7 +29,7 @@ use window::Windows;
 
 /// Rounds in which levels are read along the edge that was found with the levels
 /// before.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 3;
 /// Fraction of the rows of a caliper line that must show the edge.
 const MIN_ROWS_FRACTION: f64 = 0.5;
 

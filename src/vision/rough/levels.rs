@@ -1,5 +1,5 @@
 //! Grey levels on either side of an edge, along its course, and where each row
-//! passes half way between them.
+//! passes from one to the other.
 
 use super::crossing::{self, Flank};
 use super::kernel;
@@ -19,15 +19,27 @@ const INSIDE: (f32, f32) = (6.0, 30.0);
 const INSIDE_FRACTION: (f32, f32) = (0.14, 0.42);
 /// Pixels of a course's profile.
 pub const LENGTH: usize = OUTSIDE + 30;
-/// Rows over which levels are averaged, as the standard deviation of a Gaussian:
-/// more than texture is long, less than the light changes within.
-const ALONG_ROWS: f64 = 24.0;
+/// Rows over which the bead's level is averaged, as the standard deviation of a
+/// Gaussian: more than texture is long, less than the light changes within.
+const INSIDE_ROWS: f64 = 48.0;
+/// The same for what lies outside: a groove changes more quickly.
+const OUTSIDE_ROWS: f64 = 6.0;
 /// Fraction of the step within which a place outside is as dark as the darkest.
 const SAME: f32 = 0.1;
-/// How far inside its course an edge may be torn \[px\].
-const DEEPEST_PX: f32 = 25.0;
 /// As many such places in a row are ground; fewer are a groove.
 const GROUND_PX: usize = 8;
+/// Places of the ground that the flank may reach into.
+const FLANK_FOOT_PX: usize = 3;
+/// Depth of a groove as a fraction of the bead's level: hardly any light comes out
+/// of it. A narrow one seems less deep than it is, for the camera's blur fills it.
+const GROOVE_DEPTH: f32 = 0.87;
+/// Standard deviation of that, as a fraction of the depth: grooves with grey levels
+/// of none to a quarter of the bead's.
+pub const DEPTH_SIGMA: f64 = 0.08;
+/// Length of a groove's floor, in distances from its darkest place to the bead, at
+/// which it certainly is filled by blur, and from which on it certainly is not: a
+/// box of four and five times the blur's standard deviation (0.87 and 1.01).
+const FILLED: (f32, f32) = (0.87, 1.0);
 
 /// The mean profile across an edge, from [`OUTSIDE`] pixels before it on.
 pub type Profile = [f32; LENGTH];
@@ -39,7 +51,8 @@ pub struct Levels {
     smooth: Vec<Profile>,
     beside: Vec<BlockLevels>,
     mean: Option<MeanProfile>,
-    kernel: Vec<f32>,
+    /// Kernels of the smoothing for the levels inside and outside.
+    kernels: [Vec<f32>; 2],
 }
 
 /// What the rows show of an edge, one value a row.
@@ -49,6 +62,8 @@ pub struct Crossings {
     pub at: Vec<f32>,
     /// Length of the flank \[px\], likewise.
     pub flank: Vec<f32>,
+    /// Distance of the edge from where what lies outside ends, likewise.
+    pub gap: Vec<f32>,
 }
 
 /// Levels about one block of rows.
@@ -71,6 +86,16 @@ pub struct MeanProfile {
     pub outside: (usize, usize),
     /// Whether what lies outside is as wide as ground.
     pub on_ground: bool,
+    /// How far it looks like a groove that is too narrow to show its depth: 0 to 1.
+    pub filled: f32,
+}
+
+impl MeanProfile {
+    /// Places whose mean is the level of the ground: without those where the flank
+    /// begins.
+    pub fn ground(&self) -> (usize, usize) {
+        (self.outside.0, self.outside.1 - FLANK_FOOT_PX)
+    }
 }
 
 impl Levels {
@@ -103,14 +128,22 @@ impl Levels {
     /// Reads the levels along a course; `None` where there is no step.
     #[inline(always)]
     pub fn read(&mut self, windows: &Windows, course: &[f32], width_px: f32) -> Option<()> {
-        if self.kernel.is_empty() {
-            self.kernel = kernel(ALONG_ROWS / float(BLOCK));
+        if self.kernels[0].is_empty() {
+            self.kernels = [INSIDE_ROWS, OUTSIDE_ROWS].map(|rows| kernel(rows / float(BLOCK)));
         }
         self.align(windows, course);
-        self.smooth_blocks();
         let mean = mean_profile(&self.blocks, width_px)?;
+        let [inside, outside] = &self.kernels;
         self.beside.clear();
-        self.beside.extend(self.smooth.iter().map(|profile| block_levels(profile, &mean)));
+        smooth(&self.blocks, inside, &mut self.smooth);
+        self.beside.extend(self.smooth.iter().map(|profile| BlockLevels {
+            inside: mean_of(profile, mean.inside),
+            ..BlockLevels::default()
+        }));
+        smooth(&self.blocks, outside, &mut self.smooth);
+        for (levels, profile) in self.beside.iter_mut().zip(&self.smooth) {
+            levels.read_outside(profile, &mean);
+        }
         self.mean = Some(mean);
         (self.contrast() > 0.0).then_some(())
     }
@@ -135,49 +168,37 @@ impl Levels {
         }
     }
 
-    /// Smooths the blocks' profiles along the bead.
-    #[inline(always)]
-    fn smooth_blocks(&mut self) {
-        let count = self.blocks.len();
-        let half = self.kernel.len() - 1;
-        self.smooth.resize(count, [0.0; LENGTH]);
-        for (block, out) in self.smooth.iter_mut().enumerate() {
-            out.fill(0.0);
-            let mut total = 0.0;
-            let near = block.saturating_sub(half)..(block + half + 1).min(count);
-            for (other, profile) in near.clone().zip(&self.blocks[near]) {
-                let weight = self.kernel[other.abs_diff(block)];
-                total += weight;
-                for k in 0..LENGTH {
-                    out[k] += weight * profile[k];
-                }
-            }
-            for value in out.iter_mut() {
-                *value /= total;
-            }
-        }
-    }
-
     /// Where each row passes from outside to the bead, and how long its flank is
     /// \[px\]; not numbers where it does not.
     #[inline(always)]
     pub fn cross(&self, windows: &Windows, course: &[f32], out: &mut Crossings) {
         out.at.clear();
         out.flank.clear();
-        let ground = self.mean.filter(|mean| mean.on_ground).map(|mean| mean.outside.1 - 1);
+        out.gap.clear();
+        let ground =
+            self.mean.filter(|mean| mean.on_ground).map(|mean| mean.outside.1 - GROUND_PX / 2);
         for (number, (row, &at)) in windows.all().iter().zip(course).enumerate() {
             let levels = self.between(number);
             let start = ground.unwrap_or(levels.darkest);
             let flank = Flank {
                 start: at + single(start) - single(OUTSIDE),
-                outside: levels.outside,
+                outside: levels.outside - self.hidden_depth(&levels),
                 inside: levels.inside,
-                end: at + DEEPEST_PX,
+                course: at,
             };
             let found = crossing::of(row, &flank);
             out.at.push(found.map_or(f32::NAN, |found| found.at));
             out.flank.push(found.map_or(f32::NAN, |found| found.flank));
+            out.gap.push(found.map_or(f32::NAN, |found| found.at - flank.start));
         }
+    }
+
+    /// How much deeper than it looks a groove is taken to be \[grey levels\].
+    #[inline(always)]
+    fn hidden_depth(&self, levels: &BlockLevels) -> f32 {
+        let filled = self.mean.map_or(0.0, |mean| mean.filled);
+        let depth = levels.inside - levels.outside;
+        filled * (GROOVE_DEPTH * levels.inside - depth).max(0.0)
     }
 
     /// Levels at a row, between those of the two blocks beside it.
@@ -217,13 +238,55 @@ fn mean_profile(blocks: &[Profile], width_px: f32) -> Option<MeanProfile> {
         outside.1 += 1;
     }
     let on_ground = outside.1 - outside.0 >= GROUND_PX;
-    (bead > grey[darkest]).then_some(MeanProfile { grey, inside, outside, on_ground })
+    let filled = if on_ground { 0.0 } else { filled(&grey, outside, bead) };
+    (bead > grey[darkest]).then_some(MeanProfile { grey, inside, outside, on_ground, filled })
 }
 
-fn block_levels(profile: &Profile, mean: &MeanProfile) -> BlockLevels {
-    let darkest = darkest_of(profile, mean.outside.0.saturating_sub(3));
-    let outside = if mean.on_ground { mean_of(profile, mean.outside) } else { profile[darkest] };
-    BlockLevels { outside, inside: mean_of(profile, mean.inside), darkest }
+/// How far a groove looks too narrow to show its depth, from the length of its floor
+/// against its width.
+fn filled(grey: &Profile, floor: (usize, usize), bead: f32) -> f32 {
+    let darkest = darkest_of(grey, floor.0);
+    let depth = bead - grey[darkest];
+    let limit = grey[darkest] + SAME * depth;
+    // Where the limit lies between a place of the floor and the next one.
+    let part = |within: usize, beyond: usize| {
+        ((limit - grey[within]) / (grey[beyond] - grey[within])).clamp(0.0, 1.0)
+    };
+    let before = if floor.0 > 0 { part(floor.0, floor.0 - 1) } else { 0.0 };
+    let length = single(floor.1 - 1 - floor.0) + before + part(floor.1 - 1, floor.1);
+    let missing = grey[darkest + 1..].iter().take(OUTSIDE).map(|value| (bead - value) / depth);
+    let half = 0.5 + missing.map(|missing| missing.max(0.0)).sum::<f32>();
+    ((FILLED.1 - length / half) / (FILLED.1 - FILLED.0)).clamp(0.0, 1.0)
+}
+
+impl BlockLevels {
+    fn read_outside(&mut self, profile: &Profile, mean: &MeanProfile) {
+        self.darkest = darkest_of(profile, mean.outside.0.saturating_sub(3));
+        self.outside =
+            if mean.on_ground { mean_of(profile, mean.ground()) } else { profile[self.darkest] };
+    }
+}
+
+/// Smooths the blocks' profiles along the bead.
+#[inline(always)]
+fn smooth(blocks: &[Profile], kernel: &[f32], out: &mut Vec<Profile>) {
+    let half = kernel.len() - 1;
+    out.resize(blocks.len(), [0.0; LENGTH]);
+    for (block, out) in out.iter_mut().enumerate() {
+        out.fill(0.0);
+        let mut total = 0.0;
+        let near = block.saturating_sub(half)..(block + half + 1).min(blocks.len());
+        for (other, profile) in near.clone().zip(&blocks[near]) {
+            let weight = kernel[other.abs_diff(block)];
+            total += weight;
+            for k in 0..LENGTH {
+                out[k] += weight * profile[k];
+            }
+        }
+        for value in out.iter_mut() {
+            *value /= total;
+        }
+    }
 }
 
 /// Darkest place outside, from a place on.

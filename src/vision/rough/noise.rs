@@ -1,16 +1,18 @@
 //! How far pixel noise and texture move the mean position of an edge.
 
 use super::Scene;
-use super::levels::{Crossings, LENGTH, Levels, OUTSIDE, Profile};
+use super::crossing::INSIDE_PX;
+use super::levels::{Crossings, DEPTH_SIGMA, LENGTH, Levels, OUTSIDE, Profile};
+use super::whole;
 use super::window::Windows;
-use crate::vision::number::float;
+use crate::vision::number::{float, narrow};
 use crate::vision::strip::Grey;
 
 /// Blocks over which texture is taken to be correlated at most.
 const MAX_LAG: usize = 6;
 /// Fraction of the irregular length of a flank by which an edge may lie elsewhere
 /// in it: half, were the flank an even ramp.
-const FLANK_FRACTION: f64 = 0.25;
+const FLANK_FRACTION: f64 = 0.35;
 /// √(2π): the slope of a Gaussian flank is its height over that and its blur.
 const ROOT_TWO_PI: f64 = 2.506_628_274_631_000_5;
 
@@ -38,17 +40,23 @@ pub fn of_mean<T: Grey>(
         return None;
     }
     let rows: f64 = (0..windows.count()).map(|row| windows.rows(row)).sum();
-    let pixel = f64::from(scene.noise).powi(2) * windows.noise_gain() / rows;
-    let half_in = texture(levels, mean.inside, |block| levels.inside(block));
-    let half_out = if mean.on_ground {
-        texture(levels, mean.outside, |block| levels.outside(block))
+    let contrast = levels.contrast();
+    let half = 0.5 * mean_of(&crossings.flank);
+    // Texture that is summed on either side of the edge stands for bead that is not
+    // there, or the other way round.
+    let inside = Stretch { places: mean.inside, summed: f64::from(INSIDE_PX) + half };
+    let mut grey = texture(levels, &inside, |block| levels.inside(block));
+    if mean.on_ground {
+        let outside = Stretch { places: mean.ground(), summed: mean_of(&crossings.gap).max(1.0) };
+        grey += texture(levels, &outside, |block| levels.outside(block));
     } else {
-        0.0
-    };
-    // At half height a pixel shows as much of the bead as of what lies outside.
-    let grey = pixel + 0.25 * (half_in + half_out);
+        let pixel = f64::from(scene.noise).powi(2) * windows.noise_gain() / rows;
+        grey += pixel * 2.0 * half;
+    }
     let of_flank = FLANK_FRACTION * FLANK_FRACTION * irregularity(&crossings.flank);
-    let of_mean = grey / (slope * slope) + of_flank;
+    // What a groove's depth leaves open is the same for both edges.
+    let of_depth = DEPTH_SIGMA * f64::from(mean.filled) * mean_of(&crossings.gap);
+    let of_mean = grey / (contrast * contrast) + of_flank + 2.0 * of_depth * of_depth;
     Some(Noise {
         of_mean,
         of_row: of_mean * rows,
@@ -62,21 +70,43 @@ fn slope(profile: &Profile) -> f64 {
     steps.map(|pair| f64::from(pair[1] - pair[0])).fold(0.0, f64::max)
 }
 
-/// Variance of the mean over the rows of a column of texture beside the edge
-/// \[grey levels²\], its correlation along the bead included.
-fn texture(levels: &Levels, (from, to): (usize, usize), level: impl Fn(usize) -> f32) -> f64 {
+/// Mean of the values that are numbers.
+fn mean_of(values: &[f32]) -> f64 {
+    let seen = || values.iter().filter(|value| value.is_finite());
+    seen().map(|&value| f64::from(value)).sum::<f64>() / float(seen().count().max(1))
+}
+
+/// Places beside an edge.
+struct Stretch {
+    /// First place and the one after the last, of a profile.
+    places: (usize, usize),
+    /// How many such places are summed for the edge's position \[px\].
+    summed: f64,
+}
+
+/// Variance of the mean over the rows of the sum of so many places of texture and
+/// noise \[grey levels²\], the correlation along the bead included: from as many
+/// sums as there is room for beside each other.
+fn texture(levels: &Levels, stretch: &Stretch, level: impl Fn(usize) -> f32) -> f64 {
     let blocks = levels.blocks();
     let count = blocks.len();
+    let (from, to) = (stretch.places.0, stretch.places.1.min(LENGTH));
+    let size = whole(narrow(stretch.summed)).clamp(1, to - from);
     let mut covariances = [0.0f64; MAX_LAG + 1];
-    let value = |block: usize, k: usize| f64::from(blocks[block][k] - level(block));
-    for k in from..to.min(LENGTH) {
-        let mean = (0..count).map(|block| value(block, k)).sum::<f64>() / float(count);
-        for (lag, covariance) in covariances.iter_mut().enumerate() {
-            let pairs = (lag..count).map(|b| (value(b, k) - mean) * (value(b - lag, k) - mean));
-            *covariance += pairs.sum::<f64>() / float(count);
+    let mut sums = vec![0.0; count];
+    let mut stretches = 0.0;
+    for start in (from..=to - size).step_by(size) {
+        for (block, sum) in sums.iter_mut().enumerate() {
+            let places = &blocks[block][start..start + size];
+            *sum = places.iter().map(|&grey| f64::from(grey - level(block))).sum::<f64>();
         }
+        let mean = sums.iter().sum::<f64>() / float(count);
+        for (lag, covariance) in covariances.iter_mut().enumerate() {
+            let pairs = sums.iter().skip(lag).zip(&sums);
+            *covariance += pairs.map(|(a, b)| (a - mean) * (b - mean)).sum::<f64>() / float(count);
+        }
+        stretches += 1.0;
     }
-    let columns = float(to.min(LENGTH) - from);
     let mut sum = covariances[0];
     for covariance in &covariances[1..] {
         if *covariance <= 0.0 {
@@ -84,7 +114,7 @@ fn texture(levels: &Levels, (from, to): (usize, usize), level: impl Fn(usize) ->
         }
         sum += 2.0 * covariance;
     }
-    sum / columns / float(count)
+    sum / stretches / float(count) * (stretch.summed / float(size)).powi(2)
 }
 
 /// Variance of the mean length of the flanks \[px²\], their correlation along the

@@ -13,12 +13,12 @@ pub const BLOCK: usize = 4;
 /// bead's width: wide against texture, narrow against the bead.
 const REACH_FRACTION: f32 = 0.06;
 /// Fewest and most such pixels.
-const REACH_PX: (f32, f32) = (3.0, 10.0);
+const REACH_PX: (f32, f32) = (3.0, 6.0);
 /// How far a course may run aside from one block to the next \[px\].
 const MAX_ASIDE: usize = 8;
-/// Cost of running aside, in typical steps a pixel: a tear as deep as a block is
-/// long costs a seventh of the block's own step.
-const ASIDE_COST: f32 = 0.04;
+/// Cost of running aside, in typical steps a pixel: into a tear that is as deep as a
+/// block is long, and out again, for one and a half blocks' own step.
+const ASIDE_COST: f32 = 0.2;
 /// Rank of the typical step among the blocks' strongest.
 const TYPICAL: f32 = 0.7;
 /// Fraction of the width within which an edge lies about its rough course.
