@@ -4,6 +4,7 @@
 //! an edge does not.
 
 use super::number::single;
+use super::pair::{GAP_SHARE, RIVAL_SHARE, SAME_WIDTH, SEAM_SHARE};
 use super::rank;
 use super::rough::whole;
 use super::strip::{Grey, Strip};
@@ -24,6 +25,15 @@ const SLOPE_STEP_PX: f32 = 3.0;
 /// Rank of the bands' strongest steps above which a step counts for no more: a
 /// spark is no edge.
 const CAP_RANK: f32 = 0.7;
+/// Widest groove beside a bead \[px\]: beyond it begins another thing.
+const GROOVE_PX: f32 = 40.0;
+/// Distance within a groove in which what its far side adds to an edge falls to
+/// 1/e \[px\]: of two lines before a groove the nearer one is the edge.
+const GROOVE_FALL_PX: f32 = 20.0;
+/// Share of a groove's far side that counts for the edge.
+const FAR_SIDE: f32 = 0.5;
+/// Distance of a seam from an edge \[px\]: nearer lines belong to the edge's flank.
+const SEAM_APART_PX: f32 = 6.0;
 /// Lines of each sign that are looked at.
 const MAX_LINES: usize = 8;
 /// Difference of slope at which a pair of lines counts for 1/e.
@@ -49,6 +59,10 @@ pub struct LinePair {
     pub bright: bool,
     /// How strong the pair is \[grey levels\].
     pub score: f32,
+    /// The same without what grooves beside it add \[grey levels\].
+    pub bare: f32,
+    /// How strong each edge is, a groove beside it included \[grey levels\].
+    pub strengths: [f32; 2],
 }
 
 impl LinePair {
@@ -98,6 +112,7 @@ impl Coarse {
             }
             let (lefts, rights) =
                 if bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
+            let far_sides = (bright.then_some(rights), bright.then_some(lefts));
             for &left in lefts {
                 for &right in rights {
                     let width = right.at - left.at;
@@ -105,12 +120,74 @@ impl Coarse {
                         continue;
                     }
                     let apart = (left.slope - right.slope) / SLOPE_DIFFERENCE;
-                    let score = (left.step * right.step).sqrt() * (-apart * apart).exp();
-                    out.push(LinePair { sides: [left, right], bright, score });
+                    let strengths = [
+                        left.step + groove(&left, far_sides.0, -1.0),
+                        right.step + groove(&right, far_sides.1, 1.0),
+                    ];
+                    let parallel = (-apart * apart).exp();
+                    let score = (strengths[0] * strengths[1]).sqrt() * parallel;
+                    let bare = (left.step * right.step).sqrt() * parallel;
+                    out.push(LinePair { sides: [left, right], bright, score, bare, strengths });
                 }
             }
         }
         out.sort_by(|a, b| b.score.total_cmp(&a.score));
+    }
+
+    /// Whether two pairs have one edge in common, the other edge of the narrower one is
+    /// that of a seam or a rib within the wider one, and either may be the bead.
+    pub fn are_rivals(&self, pair: &LinePair, other: &LinePair) -> bool {
+        let (inner, outer) =
+            if pair.width_px() < other.width_px() { (pair, other) } else { (other, pair) };
+        let [left, right] = outer.sides;
+        let shares_one = (inner.sides[0] == left) != (inner.sides[1] == right);
+        let narrower = inner.width_px() < (1.0 - SAME_WIDTH) * outer.width_px();
+        if pair.bright != other.bright || !shares_one || !narrower {
+            return false;
+        }
+        let gap = self.gap(outer) / left.step.min(right.step);
+        let (ins, outs) =
+            if outer.bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
+        let least = SEAM_SHARE * left.step.max(right.step);
+        let (end, partners) =
+            if inner.sides[0] == left { (inner.sides[1], ins) } else { (inner.sides[0], outs) };
+        let has_partner = partners.iter().any(|line| {
+            let apart = (line.at - left.at).min(right.at - line.at);
+            line.step >= least && apart > SEAM_APART_PX && (line.at - end.at).abs() < GROOVE_PX
+        });
+        let is_line = end.step >= least;
+        let fits = other.bare >= RIVAL_SHARE * pair.bare || outer == pair && gap > SEAM_SHARE;
+        is_line && has_partner && fits && (outer == pair || gap < GAP_SHARE)
+    }
+
+    /// Depth of the deepest gap between the edges of a pair \[grey levels\]: a line out
+    /// of the bead, followed by one back in.
+    fn gap(&self, pair: &LinePair) -> f32 {
+        let [left, right] = pair.sides;
+        let (outs, backs) =
+            if pair.bright { (&self.downs, &self.ups) } else { (&self.ups, &self.downs) };
+        let is_within = |line: &&StepLine| line.at > left.at && line.at < right.at;
+        let mut deepest: f32 = 0.0;
+        for out in outs.iter().filter(is_within) {
+            for back in backs.iter().filter(is_within).filter(|back| back.at > out.at) {
+                deepest = deepest.max(out.step.min(back.step));
+            }
+        }
+        deepest
+    }
+
+    /// Typical step along a line between two positions where there is no edge: the
+    /// root of the mean square over all slopes \[grey levels\].
+    pub fn between(&self, from: f32, to: f32) -> f32 {
+        let range = whole(from).min(self.across)..whole(to).min(self.across);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for means in self.means.chunks(self.across) {
+            for mean in means.get(range.clone()).unwrap_or_default() {
+                sum += mean * mean;
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { (sum / count).sqrt() } else { 0.0 }
     }
 
     /// Steps of the bands' mean profiles.
@@ -183,6 +260,17 @@ impl Coarse {
             }
         }
     }
+}
+
+/// What the far side of a groove adds to an edge \[grey levels\]: the strongest line
+/// of the other sign beyond it, outwards in the direction given.
+fn groove(edge: &StepLine, far_sides: Option<&Vec<StepLine>>, outwards: f32) -> f32 {
+    let added = far_sides.into_iter().flatten().map(|far| {
+        let gap = outwards * (far.at - edge.at);
+        let within = gap > 0.0 && gap <= GROOVE_PX;
+        if within { FAR_SIDE * far.step * (-gap / GROOVE_FALL_PX).exp() } else { 0.0 }
+    });
+    added.fold(0.0, f32::max)
 }
 
 /// The strongest lines of a sign, each at least `reach` from the others.

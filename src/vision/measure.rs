@@ -51,6 +51,8 @@ struct Work {
     bands: Bands,
     lines: Vec<(usize, usize)>,
     noise: f32,
+    /// Scale across the gauge's middle.
+    mm_per_px: f64,
     width_px: f32,
     memory: Vec<f32>,
     response: Vec<i16>,
@@ -83,6 +85,7 @@ impl Measurer {
             bands: Bands::default(),
             lines: Vec::new(),
             noise: 0.0,
+            mm_per_px: 0.0,
             width_px: 0.0,
             memory: Vec::new(),
             response: Vec::new(),
@@ -221,7 +224,7 @@ impl Work {
         pool::cut(strip.along, self.gauge.calipers, &mut self.lines);
         match self.measure_steps(strip, range, view, surface) {
             Err(reject) if may_be_rough(&reject) => {
-                self.measure_rough(strip, range, view, surface).or(Err(reject))
+                self.measure_rough(strip, range, view, surface).map_err(|rough| rough.or(reject))
             }
             found => found,
         }

@@ -1,13 +1,22 @@
 //! Which contours belong together: the two edges of the bead. Their polarity
 //! and distance are those of the cell, and no gap as deep as the bead itself
-//! lies between them.
+//! lies between them. A seam or a rib within the bead is no edge while it is clearly
+//! weaker than the edges; where it is not, two pairs fit.
 
 use super::contour::{Contour, Contours};
 use super::rank;
 
-/// Depth of a gap between two edges, as a share of their step, that shows them
-/// to belong to two beads.
-const GAP_SHARE: f32 = 0.5;
+/// Depth of a gap between two edges, as a share of the weaker one, that shows them
+/// to belong to two beads: it is deeper than the bead is high over the ground.
+pub const GAP_SHARE: f32 = 1.1;
+/// The same up to which it is a seam within one bead. A seam of 60 % is no edge, and
+/// a little is left to noise.
+pub const SEAM_SHARE: f32 = 0.64;
+/// Strength of a pair within another one, as a share of the other's, from which on it
+/// fits as well: a rib of 81 % of the edges.
+pub const RIVAL_SHARE: f32 = 0.9;
+/// Share of the width by which two pairs differ at least.
+pub const SAME_WIDTH: f32 = 0.03;
 /// Share of the bands in which a gap is seen, in that of the bead's edges.
 const WHOLE: f64 = 0.85;
 
@@ -29,8 +38,16 @@ pub struct Pair {
     pub step: f32,
     /// Smaller of the shares of bands in which they are seen.
     pub share: f64,
+    /// Step of the weaker edge, less where it is not seen all along \[grey levels\].
+    pub strength: f32,
     /// How good the pair is, comparable between searches on the same frame.
     pub score: f32,
+    /// Its width \[px\].
+    pub width_px: f32,
+    /// Depth of the deepest gap between its edges, as a share of the weaker one.
+    pub gap: f32,
+    /// Width of another pair within this one that fits as well \[px\].
+    pub rival_px: Option<f32>,
 }
 
 /// The best pair of contours, or none.
@@ -41,26 +58,79 @@ pub fn find(
     memory: &mut Vec<f32>,
 ) -> Option<Pair> {
     let mut best: Option<Pair> = None;
+    each(lefts, rights, search, memory, |pair| {
+        if best.is_none_or(|best| best.score < pair.score) {
+            let sides = (&lefts.all()[pair.left], &rights.all()[pair.right]);
+            let gap = gap(lefts, rights, sides) / weaker(sides);
+            if gap < GAP_SHARE {
+                best = Some(Pair { gap, ..pair });
+            }
+        }
+    });
+    let best = best?;
+    let mut rival: Option<Pair> = None;
+    each(lefts, rights, search, memory, |pair| {
+        let (inner, outer) =
+            if pair.width_px < best.width_px { (pair, best) } else { (best, pair) };
+        let fits =
+            pair.strength >= RIVAL_SHARE * best.strength || outer == best && best.gap > SEAM_SHARE;
+        let better = rival.is_none_or(|rival| rival.score < pair.score);
+        if fits && better && is_within(&inner, &outer, (lefts, rights)) {
+            let sides = (&lefts.all()[outer.left], &rights.all()[outer.right]);
+            if outer == best || gap(lefts, rights, sides) < GAP_SHARE * weaker(sides) {
+                rival = Some(pair);
+            }
+        }
+    });
+    Some(Pair { rival_px: rival.map(|rival| rival.width_px), ..best })
+}
+
+/// Step of the weaker one of two edges \[grey levels\].
+fn weaker((left, right): (&Contour, &Contour)) -> f32 {
+    left.step.min(right.step)
+}
+
+/// Whether a pair has one edge in common with another pair, and ends within it at a
+/// seam or a rib, which has two lines of its own.
+fn is_within(inner: &Pair, outer: &Pair, (lefts, rights): (&Contours, &Contours)) -> bool {
+    let (left, right) = (&lefts.all()[outer.left], &rights.all()[outer.right]);
+    let least = SEAM_SHARE * outer.step;
+    let within =
+        |line: &&Contour| line.step >= least && in_order(left, line) && in_order(line, right);
+    let narrower = inner.width_px < (1.0 - SAME_WIDTH) * outer.width_px;
+    let ends_within = inner.left == outer.left
+        && within(&&rights.all()[inner.right])
+        && lefts.all().iter().any(|line| within(&line));
+    let begins_within = inner.right == outer.right
+        && within(&&lefts.all()[inner.left])
+        && rights.all().iter().any(|line| within(&line));
+    narrower && (ends_within || begins_within)
+}
+
+/// All pairs whose width is within the search's range.
+fn each(
+    lefts: &Contours,
+    rights: &Contours,
+    search: Search,
+    memory: &mut Vec<f32>,
+    mut visit: impl FnMut(Pair),
+) {
     for (left, edge) in lefts.all().iter().enumerate() {
         for (right, other) in rights.all().iter().enumerate() {
-            let Some(width) = distance(edge, other, memory) else { continue };
-            if width < search.width_px.0 || width > search.width_px.1 {
+            let Some(width_px) = distance(edge, other, memory) else { continue };
+            if width_px < search.width_px.0 || width_px > search.width_px.1 {
                 continue;
             }
             let step = (edge.step * other.step).sqrt();
             let share = edge.share.min(other.share);
             #[expect(clippy::cast_possible_truncation, reason = "a share")]
             let shares = (edge.share * other.share) as f32;
-            let score = step * shares / ((1.0 + edge.wobble) * (1.0 + other.wobble)).sqrt();
-            if best.is_some_and(|best| best.score >= score)
-                || gap(lefts, rights, (edge, other)) > GAP_SHARE * step
-            {
-                continue;
-            }
-            best = Some(Pair { left, right, step, share, score });
+            let strength = edge.step.min(other.step) * shares;
+            let score = strength / ((1.0 + edge.wobble) * (1.0 + other.wobble)).sqrt();
+            let (gap, rival_px) = (0.0, None);
+            visit(Pair { left, right, step, share, strength, score, width_px, gap, rival_px });
         }
     }
-    best
 }
 
 /// Median distance from one contour to another to its right \[px\]; `None`
@@ -119,8 +189,12 @@ mod tests {
                 *value += 4 * height;
             }
         }
+        contours(&profile)
+    }
+
+    fn contours(profile: &[u16]) -> (Contours, Contours) {
         let mut response = vec![0; 200];
-        respond(&profile, &mut response);
+        respond(profile, &mut response);
         let mut steps = Candidates::default();
         steps.find(&response, 5.0, 0.0625);
         let bands = vec![steps; 20];
@@ -139,9 +213,43 @@ mod tests {
     const WIDE: Search = Search { width_px: (10.0, 80.0) };
 
     #[test]
-    fn the_gap_between_two_beads_is_not_bridged() {
-        let found = width(&bars(&[(50, 75, 80), (85, 110, 80)]), WIDE).unwrap();
-        assert!((found - 25.0).abs() < 0.5);
+    fn two_beads_with_a_gap_are_as_likely_as_one_with_a_seam() {
+        let bars = bars(&[(50, 75, 80), (85, 110, 80)]);
+        let mut memory = Vec::new();
+        let both = find(&bars.0, &bars.1, WIDE, &mut memory).unwrap();
+        assert!(both.rival_px.is_some(), "{both:?}");
+        let one = find(&bars.0, &bars.1, Search { width_px: (10.0, 40.0) }, &mut memory).unwrap();
+        assert!((one.width_px - 25.0).abs() < 0.5 && one.rival_px.is_none(), "{one:?}");
+    }
+
+    #[test]
+    fn a_gap_that_is_deeper_than_the_ground_is_not_bridged() {
+        let mut profile = vec![160 + 4 * 40; 200];
+        let ground = 160;
+        for (from, to, height) in [(40, 70, 120), (70, 90, 0), (90, 130, 120)] {
+            profile[from..to].fill(ground + 4 * height);
+        }
+        let (up, down) = contours(&profile);
+        assert!((width(&(up, down), WIDE).unwrap() - 40.0).abs() < 0.5);
+    }
+
+    #[test]
+    fn a_seam_is_no_edge_while_it_is_weak_and_leaves_two_widths_where_it_is_not() {
+        let seamed = |level: u16| bars(&[(50, 70, 80), (70, 78, level), (78, 110, 80)]);
+        let mut memory = Vec::new();
+        let mut pair = |level: u16| {
+            let bars = seamed(level);
+            find(&bars.0, &bars.1, WIDE, &mut memory).unwrap()
+        };
+        let weak = pair(40);
+        assert!((weak.width_px - 60.0).abs() < 0.5 && weak.rival_px.is_none(), "{weak:?}");
+        let strong = pair(16);
+        assert!((strong.width_px - 60.0).abs() < 0.5, "{strong:?}");
+        assert!((strong.rival_px.unwrap() - 32.0).abs() < 0.5, "{strong:?}");
+        let range = Search { width_px: (45.0, 80.0) };
+        let bars = seamed(16);
+        let alone = find(&bars.0, &bars.1, range, &mut memory).unwrap();
+        assert!((alone.width_px - 60.0).abs() < 0.5 && alone.rival_px.is_none(), "{alone:?}");
     }
 
     #[test]

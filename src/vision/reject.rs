@@ -84,6 +84,13 @@ pub enum Reject {
         /// `max_sigma`.
         max_sigma: f64,
     },
+    /// Edges that hardly stand out from the bead's texture.
+    Vague {
+        /// Strength of the weaker edge, in typical steps of the texture.
+        got: f64,
+        /// The same that is needed.
+        need: f64,
+    },
     /// Two pairs of edges fit equally well.
     Ambiguous {
         /// Width of the one pair \[mm\].
@@ -117,6 +124,15 @@ pub enum Reject {
 }
 
 impl Reject {
+    /// The more telling of the reasons why a frame has neither rough edges, which is
+    /// this one, nor smooth ones.
+    pub fn or(self, smooth: Self) -> Self {
+        match self {
+            Self::NoPair { .. } => smooth,
+            told => told,
+        }
+    }
+
     /// The status that a frame gets in `widths.csv`.
     pub fn status(&self) -> &'static str {
         match self {
@@ -126,7 +142,10 @@ impl Reject {
             Self::WidthOutOfRange { .. } => "width_out_of_range",
             Self::Crooked { .. } => "crooked",
             Self::Corner { .. } => "corner",
-            Self::Scattered { .. } | Self::Occluded { .. } | Self::Unsure { .. } => "unsure",
+            Self::Scattered { .. }
+            | Self::Occluded { .. }
+            | Self::Unsure { .. }
+            | Self::Vague { .. } => "unsure",
             Self::Ambiguous { .. } => "ambiguous",
             Self::Clipped { .. } => "clipped",
             Self::WrongSize { .. } | Self::OtherSize { .. } => "wrong_size",
@@ -199,6 +218,10 @@ impl fmt::Display for Reject {
                     100.0 * max_sigma,
                 )
             }
+            Self::Vague { got, need } => write!(
+                f,
+                "the fainter edge stands out {got:.1} times from the bead's texture, {need:.1} are needed; light that makes both edges clear, or a longer gauge along the bead, helps"
+            ),
             Self::Ambiguous { first_mm, second_mm } => write!(
                 f,
                 "two pairs of edges fit equally well, one {first_mm:.2} mm wide, the other {second_mm:.2} mm; a narrower width_range_mm, or a given polarity or edge, decides between them"

@@ -2,6 +2,7 @@
 
 use super::{NEED_SHARE, Work};
 use crate::calib::SurfaceMap;
+use crate::vision::coarse::LinePair;
 use crate::vision::gauge::Polarity;
 use crate::vision::reject::Reject;
 use crate::vision::rough::Scene;
@@ -11,6 +12,14 @@ use crate::vision::width::WidthMeasurement;
 /// The search range allows 1.5 times too wide and too narrow single places; lines
 /// are means over the gauge, and stay nearer.
 const LINE_SLACK: f32 = 1.4;
+
+/// Part of the width beside either edge where its flank may be \[of the width\]: the
+/// bead's texture is taken from between.
+const TEXTURE_MARGIN: f32 = 0.15;
+/// How much stronger than a typical line of texture an edge must be: on layers that
+/// are seen from the side, whose lower edges fade into shadow, lines of texture were
+/// taken for edges up to 4.8; the edges of concrete beads have 5 to 17.
+const STANDS_OUT: f64 = 5.0;
 
 impl Work {
     /// Measures a bead by where its rows pass half height.
@@ -30,6 +39,8 @@ impl Work {
             [self.gauge.polarity != Polarity::Dark, self.gauge.polarity != Polarity::Bright];
         self.coarse.pairs(range, polarities, &mut self.pairs);
         let pair = *self.pairs.first().ok_or(failed)?;
+        self.check_stands_out(&pair)?;
+        self.check_rivals(&pair)?;
         let scene = Scene {
             strip,
             lines: &self.lines,
@@ -54,6 +65,24 @@ impl Work {
     }
 }
 
+impl Work {
+    /// Refuses a pair that the bead's texture may have made.
+    fn check_stands_out(&self, pair: &LinePair) -> Result<(), Reject> {
+        let [left, right] = pair.sides;
+        let margin = TEXTURE_MARGIN * pair.width_px();
+        let texture = self.coarse.between(left.at + margin, right.at - margin);
+        let got = f64::from(pair.strengths[0].min(pair.strengths[1]) / texture.max(f32::EPSILON));
+        if got < STANDS_OUT { Err(Reject::Vague { got, need: STANDS_OUT }) } else { Ok(()) }
+    }
+
+    /// Refuses a pair beside which another one fits as well that ends at a seam or a
+    /// rib.
+    fn check_rivals(&self, pair: &LinePair) -> Result<(), Reject> {
+        let rival = self.pairs.iter().skip(1).find(|other| self.coarse.are_rivals(pair, other));
+        rival.map_or(Ok(()), |rival| Err(self.ambiguous(pair.width_px(), rival.width_px())))
+    }
+}
+
 /// Whether a frame that was refused as one with smooth edges may show a rough
 /// bead.
 pub fn may_be_rough(reject: &Reject) -> bool {
@@ -64,5 +93,6 @@ pub fn may_be_rough(reject: &Reject) -> bool {
             | Reject::WidthOutOfRange { .. }
             | Reject::Scattered { .. }
             | Reject::Occluded { .. }
+            | Reject::Ambiguous { .. }
     )
 }

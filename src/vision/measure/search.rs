@@ -68,7 +68,7 @@ impl Work {
 
     /// The believed widths in pixels across the gauge's middle.
     pub(super) fn search_range(
-        &self,
+        &mut self,
         view: &View,
         surface: &SurfaceMap,
     ) -> Result<(f32, f32), Reject> {
@@ -77,6 +77,7 @@ impl Work {
         let middle = surface.to_mm(view.to_image(u, v)).ok_or(Reject::OffSurface)?;
         let beside = surface.to_mm(view.to_image(u + 1.0, v)).ok_or(Reject::OffSurface)?;
         let mm_per_px = (beside - middle).norm();
+        self.mm_per_px = mm_per_px;
         let (min, max) = self.gauge.width_range;
         #[expect(clippy::cast_possible_truncation, reason = "widths in pixels")]
         let range = (
@@ -90,7 +91,10 @@ impl Work {
     pub(super) fn find_pair(&mut self, width_px: (f32, f32)) -> Result<Found, Reject> {
         let found = self.search(width_px);
         if let Some(found) = found.filter(|found| found.pair.share >= NEED_SHARE) {
-            return Ok(found);
+            return match found.pair.rival_px {
+                Some(rival_px) => Err(self.ambiguous(found.pair.width_px, rival_px)),
+                None => Ok(found),
+            };
         }
         let got = found.map_or(0.0, |found| found.pair.share);
         let refused = Reject::NoPair { got, need: NEED_SHARE };
@@ -102,6 +106,12 @@ impl Work {
             Some(found) => Ok(found),
             None => Err(self.too_much_light().unwrap_or(refused)),
         }
+    }
+
+    /// The refusal of a frame in which two pairs fit.
+    pub(super) fn ambiguous(&self, first_px: f32, second_px: f32) -> Reject {
+        let mm = |px: f32| f64::from(px) * self.mm_per_px;
+        Reject::Ambiguous { first_mm: mm(first_px), second_mm: mm(second_px) }
     }
 
     fn search(&mut self, width_px: (f32, f32)) -> Option<Found> {
