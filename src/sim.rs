@@ -14,6 +14,7 @@ pub mod corner;
 pub mod diagne2015;
 pub mod discs;
 pub mod disturbance;
+pub mod drawn;
 pub mod edge;
 pub mod extruder;
 pub mod follow;

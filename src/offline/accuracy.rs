@@ -1,6 +1,7 @@
 //! How well widths are measured: figures of sets of pictures with their truth.
 
 pub mod calibration;
+pub mod drawn;
 mod table;
 mod verdict;
 

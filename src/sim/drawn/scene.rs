@@ -1,0 +1,122 @@
+//! What lies where in a frame.
+
+/// A bead and its surroundings. Lengths in pixels, brightness in grey levels of a
+/// camera with gamma 1.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// Columns and rows; the bead runs along the rows' normal.
+    pub size: (usize, usize),
+    /// Width of the bead before its edges are torn.
+    pub width_px: f64,
+    /// Brightness of the bead.
+    pub bead_grey: f64,
+    /// Brightness of the ground.
+    pub ground_grey: f64,
+    /// How its edges are torn.
+    pub edges: Tear,
+    /// Aggregate on beads.
+    pub texture: Patches,
+    /// Pattern of the ground.
+    pub ground_texture: Patches,
+    /// Grooves on either side.
+    pub grooves: [Option<Groove>; 2],
+    /// Number of holes within the bead, and of bays in its edges, and their size.
+    pub holes: Option<Holes>,
+    /// A seam (dark), or a rib or highlight (bright).
+    pub rib: Option<Rib>,
+    /// Sideways motion while the shutter is open.
+    pub motion_px: f64,
+    /// Standard deviation of the lens's blur.
+    pub blur_px: f64,
+    /// Brightness in the middle over that in the corners.
+    pub vignetting: f64,
+    /// Exponent of the camera: 255·(light/255)^gamma.
+    pub gamma: f64,
+    /// Standard deviation of a pixel's noise.
+    pub noise_grey: f64,
+    /// Quality of the JPEG that the frame was.
+    pub jpeg: Option<u8>,
+}
+
+/// Roughness of an edge and its correlation length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tear {
+    /// Standard deviation of the local position.
+    pub roughness_px: f64,
+    /// Of the autocorrelation exp(−|d|/length).
+    pub length_px: f64,
+}
+
+/// A random pattern with the autocorrelation exp(−(r/length)²).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Patches {
+    /// Standard deviation.
+    pub size_grey: f64,
+    /// Correlation length.
+    pub length_px: f64,
+}
+
+/// A groove beside the bead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Groove {
+    /// Mean width.
+    pub width_px: f64,
+    /// Brightness.
+    pub grey: f64,
+    /// Whether another bead lies beyond it, and not ground.
+    pub neighbour: bool,
+}
+
+/// Holes of one size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Holes {
+    /// How many within the bead and as bays in either edge.
+    pub count: usize,
+    /// Diameter.
+    pub size_px: f64,
+    /// Brightness.
+    pub grey: f64,
+}
+
+/// A line along the bead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rib {
+    /// Its middle, from the bead's axis.
+    pub at_px: f64,
+    /// Width.
+    pub width_px: f64,
+    /// Brightness over the bead's; a seam's is negative.
+    pub over_grey: f64,
+}
+
+impl Default for Scene {
+    /// The bead of `ACCURACY.md`: 332 px, 150 on 70, σ = 4, s = 1.5.
+    fn default() -> Self {
+        let none = Patches { size_grey: 0.0, length_px: 1.0 };
+        Self {
+            size: (640, 100),
+            width_px: 332.0,
+            bead_grey: 150.0,
+            ground_grey: 70.0,
+            edges: Tear { roughness_px: 0.0, length_px: 10.0 },
+            texture: none,
+            ground_texture: none,
+            grooves: [None; 2],
+            holes: None,
+            rib: None,
+            motion_px: 0.0,
+            blur_px: 1.5,
+            vignetting: 1.0,
+            gamma: 1.0,
+            noise_grey: 4.0,
+            jpeg: None,
+        }
+    }
+}
+
+impl Scene {
+    /// Step from the ground to the bead \[grey levels\].
+    pub fn contrast(&self) -> f64 {
+        self.bead_grey - self.ground_grey
+    }
+}
