@@ -75,7 +75,7 @@ mod tests {
         std::array::from_fn(|k| of(single(k)))
     }
 
-    const FLANK: Flank = Flank { start: 40.0, outside: 20.0, inside: 120.0, course: 54.0 };
+    const FLANK: Flank = Flank { start: 40.0, outside: 20.0, inside: 120.0, course: 58.0 };
 
     #[test]
     fn a_ramp_is_passed_in_its_middle() {
