@@ -87,7 +87,7 @@ mod tests {
     #[test]
     fn noise_has_the_standard_deviation_asked_for() {
         let scene = Scene { noise_grey: 4.0, size: (200, 200), ..Scene::default() };
-        let pixels = expose(&[100.0; 40_000], &scene, &mut Draw::new("test", 2));
+        let pixels = expose(&vec![100.0; 40_000], &scene, &mut Draw::new("test", 2));
         let squares: f64 = pixels.iter().map(|&grey| (f64::from(grey) - 100.0).powi(2)).sum();
         // Rounding adds 1/12 to the variance; 40,000 pixels tell it to 0.7 %.
         assert!((squares / 40_000.0 - 16.083).abs() < 0.45, "{}", squares / 40_000.0);

@@ -9,6 +9,9 @@ use super::scene::{Groove, Holes, Scene};
 /// Smallest width of a groove, as a fraction of its mean: its two rough sides do not
 /// cross.
 const MIN_GROOVE: f64 = 0.2;
+/// Largest standard deviation of a groove's width, as a fraction of its mean. The sides
+/// of a narrow groove follow each other.
+const MAX_GROOVE_SPREAD: f64 = 1.0 / 3.0;
 /// Distance of a hole from the deepest bay \[px\], so that no hole is open: more than
 /// six times the roughness of the edges.
 const HOLE_CLEARANCE_PX: f64 = 14.0;
@@ -69,23 +72,26 @@ impl Outline {
             half: scene.width_px / 2.0 + draw.between(-0.5, 0.5),
         };
         let edges = scene.edges;
-        let line = |at: f64, draw: &mut Draw| -> Vec<f64> {
-            let deviations = rough(count, edges.roughness_px, edges.length_px, draw);
-            deviations.into_iter().map(|deviation| at + deviation).collect()
-        };
-        let mut left = line(bead.axis - bead.half, draw);
-        let mut right = line(bead.axis + bead.half, draw);
+        let torn = |draw: &mut Draw| rough(count, edges.roughness_px, edges.length_px, draw);
+        let (left, right) = (torn(draw), torn(draw));
         let far_side = |groove: Option<Groove>, outwards: f64, near: &[f64], draw: &mut Draw| {
             let groove = groove?;
-            let mut far = line(bead.axis + outwards * (bead.half + groove.width_px), draw);
-            for (far, near) in far.iter_mut().zip(near) {
-                let gap = (outwards * (*far - near)).max(MIN_GROOVE * groove.width_px);
-                *far = near + outwards * gap;
-            }
-            Some(far)
+            let common = common_share(groove.width_px, edges.roughness_px);
+            let own = (1.0 - common * common).sqrt();
+            let gap = |(near, fresh): (&f64, f64)| {
+                let mean = groove.width_px + outwards * (common * near + own * fresh - near);
+                near + outwards * mean.max(MIN_GROOVE * groove.width_px)
+            };
+            let at_px = bead.axis + outwards * bead.half;
+            Some(near.iter().zip(torn(draw)).map(gap).map(|place| at_px + place).collect())
         };
         let [before, after] = scene.grooves;
         let far = [far_side(before, -1.0, &left, draw), far_side(after, 1.0, &right, draw)];
+        let place = |at_px: f64, deviations: Vec<f64>| -> Vec<f64> {
+            deviations.into_iter().map(|deviation| at_px + deviation).collect()
+        };
+        let mut left = place(bead.axis - bead.half, left);
+        let mut right = place(bead.axis + bead.half, right);
         let mut holes = Vec::new();
         if let Some(dug) = &scene.holes {
             cut_bays(dug, &mut left, (bead.axis - bead.half, 1.0), draw);
@@ -158,6 +164,14 @@ impl Outline {
     }
 }
 
+/// How much of a groove's far side repeats its near side, so that its width spreads as
+/// much as it may: two sides of the roughness r with the correlation c differ by
+/// r·√(2 − 2c).
+fn common_share(width_px: f64, roughness_px: f64) -> f64 {
+    let spread = MAX_GROOVE_SPREAD * width_px / roughness_px.max(f64::MIN_POSITIVE);
+    (1.0 - 0.5 * spread * spread).max(0.0)
+}
+
 /// Cuts bays out of an edge that lies at a place, towards +1 or −1.
 fn cut_bays(dug: &Holes, edge: &mut [f64], (at_px, inwards): (f64, f64), draw: &mut Draw) {
     let height = height_of(edge.len());
@@ -182,4 +196,34 @@ fn dig(dug: &Holes, bead: Straight, lines: usize, draw: &mut Draw) -> Vec<Disc> 
         radius: dug.size_px / 2.0,
     };
     (0..2 * dug.count).map(disc).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::drawn::profile::PER_PX;
+    use crate::sim::drawn::scene::Tear;
+
+    #[test]
+    fn grooves_are_as_wide_as_asked_for_and_rough_on_both_sides() {
+        for width_px in [2.0, 10.0, 40.0] {
+            let groove = Groove { width_px, grey: 10.0, neighbour: true };
+            let edges = Tear { roughness_px: 3.0, length_px: 8.0 };
+            let scene = Scene { grooves: [Some(groove); 2], edges, ..Scene::default() };
+            let count = 20_000 * PER_PX;
+            let outline = Outline::draw(&scene, count, &mut Draw::new("groove", 1));
+            let far = outline.far[1].as_ref().unwrap();
+            let gaps: Vec<f64> =
+                far.iter().zip(&outline.right).map(|(far, near)| far - near).collect();
+            let mean = |values: &[f64]| {
+                values.iter().sum::<f64>() / f64::from(u32::try_from(values.len()).unwrap())
+            };
+            assert!((mean(&gaps) / width_px - 1.0).abs() < 0.03, "{width_px}: {}", mean(&gaps));
+            assert!(gaps.iter().all(|gap| *gap > 0.19 * width_px));
+            let middle = mean(far);
+            let squares: Vec<f64> = far.iter().map(|far| (far - middle).powi(2)).collect();
+            // 20,000 px with a correlation length of 8 px hold 1,250 independent places.
+            assert!((mean(&squares) / 9.0 - 1.0).abs() < 0.15, "{}", mean(&squares));
+        }
+    }
 }

@@ -14,6 +14,9 @@ const LENGTH_PX: (f64, f64) = (3.0, 40.0);
 const STEEPEST: f64 = 0.5;
 /// Roughness of edges in sets about something else \[px\].
 const ROUGHNESS_PX: (f64, f64) = (0.5, 2.0);
+/// Roughness of edges in sets about what concrete looks like \[px\]: that of labels
+/// drawn by hand.
+const CONCRETE_PX: (f64, f64) = (0.5, 4.0);
 /// Largest roughness of a narrow bead, as a fraction of its width.
 const NARROW_ROUGHNESS: f64 = 0.03;
 
@@ -24,10 +27,11 @@ const BAYS: (f64, f64) = (1.0, 6.0);
 /// Width of a groove \[px\].
 const GROOVE_PX: (f64, f64) = (2.0, 40.0);
 /// Brightness of grooves and holes \[grey levels\]: of real grooves that are wide enough
-/// to show it.
-const GROOVE_GREY: (f64, f64) = (3.0, 35.0);
-/// Texture of the bead \[grey levels\] and its correlation length \[px\].
-const TEXTURE_GREY: (f64, f64) = (5.0, 20.0);
+/// to show it, as far as they are darker than the ground.
+const GROOVE_GREY: (f64, f64) = (2.0, 60.0);
+/// Texture of the bead \[grey levels\] and its correlation length \[px\]: up to the
+/// fraction of the contrast that real beads have, 0.38.
+const TEXTURE_GREY: (f64, f64) = (5.0, 30.0);
 const TEXTURE_PX: (f64, f64) = (2.0, 8.0);
 
 /// Step and noise in low light \[grey levels\], on a ground that is nearly dark.
@@ -91,11 +95,15 @@ fn rough(draw: &mut Draw, roughness_px: (f64, f64)) -> Tear {
 
 /// The default scene; every other one has rough edges.
 fn usual(draw: &mut Draw) -> Scene {
+    half_rough(draw, ROUGHNESS_PX)
+}
+
+fn half_rough(draw: &mut Draw, roughness_px: (f64, f64)) -> Scene {
     if draw.one_of(2.0) {
-        return Scene { edges: rough(draw, ROUGHNESS_PX), ..Scene::default() };
+        return Scene { edges: rough(draw, roughness_px), ..Scene::default() };
     }
     draw.keep("length_px", 0.0, LENGTH_PX);
-    draw.keep("roughness_px", 0.0, ROUGHNESS_PX);
+    draw.keep("roughness_px", 0.0, roughness_px);
     Scene::default()
 }
 
@@ -121,14 +129,14 @@ pub fn grooves(draw: &mut Draw) -> Scene {
     };
     let left = groove("left_groove_px", "left_groove_grey");
     let right = groove("right_groove_px", "right_groove_grey");
-    Scene { grooves: [Some(left), Some(right)], ..usual(draw) }
+    Scene { grooves: [Some(left), Some(right)], ..half_rough(draw, CONCRETE_PX) }
 }
 
 /// Aggregate of the bead.
 pub fn texture(draw: &mut Draw) -> Scene {
     let size_grey = draw.log("texture_grey", TEXTURE_GREY);
     let length_px = draw.log("texture_px", TEXTURE_PX);
-    Scene { texture: Patches { size_grey, length_px }, ..usual(draw) }
+    Scene { texture: Patches { size_grey, length_px }, ..half_rough(draw, CONCRETE_PX) }
 }
 
 /// A faint bead in much noise.

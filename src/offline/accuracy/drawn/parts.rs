@@ -28,13 +28,12 @@ pub fn figures(set: &DrawnSet, outcomes: &[DrawnOutcome]) -> Vec<DrawnFigures> {
                 None => {}
             }
         }
-        let parameter = parameter.clone();
         if !zero.is_empty() {
             let part = Part::Zero { parameter: parameter.name };
             figures.push(DrawnFigures::of(set, part, &zero));
         }
         for (number, some) in (0..PARTS).zip(parts) {
-            let (from, to) = (end(&parameter, number), end(&parameter, number + 1));
+            let (from, to) = (end(parameter, number), end(parameter, number + 1));
             let part = Part::Third { parameter: parameter.name, from, to };
             figures.push(DrawnFigures::of(set, part, &some));
         }

@@ -15,18 +15,18 @@ fn outcome(frame: u32, width: Result<Deviation, Refusal>) -> DrawnOutcome {
     DrawnOutcome { frame: frame.into(), parameters, width }
 }
 
-fn off(error_px: f64) -> Result<Deviation, Refusal> {
-    Ok(Deviation { error_px, sigma_px: 0.1 })
+fn off(error_px: f64) -> Deviation {
+    Deviation { error_px, sigma_px: 0.1 }
 }
 
-fn refused(status: &'static str, names_gamma: bool) -> Result<Deviation, Refusal> {
-    Err(Refusal { status, names_gamma })
+fn refused(status: &'static str, names_gamma: bool) -> Refusal {
+    Refusal { status, names_gamma }
 }
 
 /// Frames whose errors are as their sigma.
 fn good() -> Vec<DrawnOutcome> {
     let sign = |frame: u32| if frame % 4 < 2 { 0.1 } else { -0.1 };
-    (0..300).map(|frame| outcome(frame, off(sign(frame)))).collect()
+    (0..300).map(|frame| outcome(frame, Ok(off(sign(frame))))).collect()
 }
 
 #[test]
@@ -40,9 +40,9 @@ fn frames_are_counted_within_thirds_and_judged() {
     assert_eq!(all_kept[4].part, Part::Zero { parameter: "roughness_px" });
     let rough: Vec<usize> = all_kept[4..].iter().map(|part| part.frames).collect();
     assert_eq!(rough, [150, 0, 150, 0]);
-    outcomes[299].width = off(4.0);
+    outcomes[299].width = Ok(off(4.0));
     for outcome in &mut outcomes[..40] {
-        outcome.width = refused("unsure", true);
+        outcome.width = Err(refused("unsure", true));
     }
     let bad = figures(&set, &outcomes);
     assert_eq!((bad[0].silent, bad[0].worst[0], bad[0].refused["unsure"]), (1, 299, 40));
@@ -56,10 +56,10 @@ fn frames_are_counted_within_thirds_and_judged() {
 #[test]
 fn refusals_are_judged_by_status_and_words() {
     let mut outcomes = good();
-    outcomes[7].width = refused("ambiguous", true);
+    outcomes[7].width = Err(refused("ambiguous", true));
     assert!(figures(&set("ribs-strong"), &outcomes)[0].missed.is_empty());
     assert!(figures(&set("gamma"), &outcomes)[0].missed.is_empty());
-    outcomes[8].width = refused("no_pair", false);
+    outcomes[8].width = Err(refused("no_pair", false));
     assert_eq!(figures(&set("ribs-strong"), &outcomes)[0].missed, ["refused otherwise 1"]);
     let missed = figures(&set("gamma"), &outcomes)[0].missed.join("");
     assert_eq!(missed, "refused without a word on gamma 1");
@@ -70,9 +70,9 @@ fn with_all_frames_a_limit_has_no_allowance() {
     let set = set("torn");
     let outcomes = |count: u32| -> Vec<DrawnOutcome> {
         let width = |frame: u32| match frame % 80 {
-            0 => refused("unsure", true),
-            _ if frame.is_multiple_of(2) => off(0.1),
-            _ => off(-0.1),
+            0 => Err(refused("unsure", true)),
+            _ if frame.is_multiple_of(2) => Ok(off(0.1)),
+            _ => Ok(off(-0.1)),
         };
         (0..count).map(|frame| outcome(frame % 300, width(frame))).collect()
     };
