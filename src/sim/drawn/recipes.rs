@@ -80,8 +80,10 @@ const BLOCK_PX: f64 = 8.0;
 const VIGNETTING: (f64, f64) = (1.1, 4.0);
 /// Blur of the lens \[px\].
 const BLUR_PX: (f64, f64) = (0.5, 6.0);
-/// Width of a bead \[px\], and its smallest in blurs.
-const WIDTH_PX: (f64, f64) = (5.0, 600.0);
+/// Nominal width of a bead \[px\]: 5 to 600 px, less what a frame's differs from it.
+const WIDTH_PX: (f64, f64) = (5.0 + WIDTH_SPREAD_PX, 600.0 - WIDTH_SPREAD_PX);
+const WIDTH_SPREAD_PX: f64 = 1.0;
+/// Smallest width in blurs.
 const MIN_BLURS: f64 = 4.0;
 
 /// Roughness and correlation length of a frame's edges.
@@ -216,7 +218,7 @@ pub fn blur(draw: &mut Draw) -> Scene {
 pub fn narrow(draw: &mut Draw) -> Scene {
     let width_px = draw.log("width_px", WIDTH_PX);
     let scene = usual(draw);
-    let blur_px = scene.blur_px.min((width_px - 0.5) / MIN_BLURS);
+    let blur_px = scene.blur_px.min((width_px - WIDTH_SPREAD_PX) / MIN_BLURS);
     let roughness_px = scene.edges.roughness_px.min(NARROW_ROUGHNESS * width_px);
     let edges = Tear { roughness_px, ..scene.edges };
     Scene { width_px, edges, blur_px, ..scene }
