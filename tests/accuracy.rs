@@ -75,3 +75,46 @@ fn a_set_that_is_not_there_is_refused_with_those_that_are() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(said.contains("blurr") && said.contains("grains-6-dark"), "{said}");
 }
+
+/// The sets whose every parameter is drawn, on few frames: a verdict may be either.
+#[test]
+fn drawn_sets_are_counted_and_judged_and_frames_kept() {
+    let out = tempfile::tempdir().unwrap();
+    let folder = out.path().to_str().unwrap();
+    let args = ["--random", "all", "--frames", "300", "--keep-frames", "2", "--out", folder];
+    let status = accuracy(&args).output().unwrap().status.code();
+    let json = fs::read(out.path().join("random.json")).unwrap();
+    let figures: Vec<Value> = serde_json::from_slice(&json).unwrap();
+    let whole: Vec<&Value> = figures.iter().filter(|figures| figures["part"] == "all").collect();
+    assert_eq!(whole.len(), 18);
+    for figures in &whole {
+        let refused = figures["refused"].as_object().unwrap().values();
+        let refused: u64 = refused.map(|count| count.as_u64().unwrap()).sum();
+        let measured = 300.0 * figures["measured_share"].as_f64().unwrap();
+        assert!((measured + f64::from(u32::try_from(refused).unwrap()) - 300.0).abs() < 1e-6);
+    }
+    let missed = figures.iter().any(|figures| !figures["missed"].as_array().unwrap().is_empty());
+    assert_eq!(status, Some(i32::from(missed)));
+    let lines = fs::read_to_string(out.path().join("random.md")).unwrap();
+    assert!(lines.contains("# grooves") && lines.contains("left_groove_px 2.000 to 40.000"));
+    let table = fs::read_to_string(out.path().join("frames/torn.csv")).unwrap();
+    let row = table.lines().nth(2).unwrap();
+    assert!(table.starts_with("file,status,width_px,sigma_px,truth_px,length_px,roughness_px"));
+    assert!(row.starts_with("torn-000001.png,") && table.lines().count() == 3, "{table}");
+    assert!(out.path().join("frames/torn-000001.png").is_file());
+}
+
+#[test]
+fn a_drawn_frame_does_not_depend_on_how_many_there_are() {
+    let kept = |frames: &str| {
+        let out = tempfile::tempdir().unwrap();
+        let folder = out.path().to_str().unwrap();
+        let args = ["--random", "ribs,jpeg", "--frames", frames, "--keep-frames", "2"];
+        accuracy(&[&args[..], &["--out", folder]].concat()).output().unwrap();
+        fs::read(out.path().join("frames/ribs-strong-000001.png")).unwrap()
+    };
+    assert_eq!(kept("3"), kept("9"));
+    let output = accuracy(&["--random", "torn,tor"]).assert().code(2).get_output().clone();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("--random tor:") && said.contains("ground-texture-weak"), "{said}");
+}

@@ -1,29 +1,27 @@
 //! `truebead accuracy`: how well widths are measured in pictures whose truth is
 //! known.
 
-use std::io::Cursor;
-use std::path::{Path, PathBuf};
+mod random;
+
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result};
 use clap::Args;
-use image::{GrayImage, ImageFormat};
 use rayon::prelude::*;
 
 use super::{Voice, WrongArguments};
-use crate::calib::SurfaceMap;
-use crate::frame::Pixels;
 use crate::offline::accuracy::calibration::{self, RigFigures};
-use crate::offline::accuracy::drawn::{self as figures_of_drawn, Deviation, DrawnOutcome};
 use crate::offline::accuracy::{Outcome, SetFigures, markdown, table};
 use crate::offline::{Progress, output};
 use crate::sim::calibrations::{self, Bench, Rig, Source};
-use crate::sim::drawn::{self, DrawnSet};
 use crate::sim::sets::{self, Set};
 use crate::sim::studio::Studio;
 use crate::vision::Measurer;
 
+/// Frames of a set where nothing else is said.
+const FRAMES: u64 = 3_000;
 /// Frames that one measurer measures after each other, as in a cell.
 const RUN: u64 = 250;
 
@@ -44,24 +42,30 @@ status is 1 where there are any. ACCURACY.md says what every set is.
 
 calibrates cameras whose truth is known, from corners with noise and from
 rendered pictures of boards, and compares the scatter of widths with what the
-calibrations foretell.")]
+calibrations foretell.
+
+  truebead accuracy --random torn,grooves --frames 3000 --keep-frames 20 --out random
+
+renders frames whose every parameter is drawn, uniformly in its logarithm, from
+the ranges of each set, and measures each of them alone.")]
 pub struct AccuracyArgs {
-    /// Frames of each set
-    #[arg(long, value_name = "N", default_value = "3000", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
-    frames: u64,
+    /// Frames of each set [default: 3000, with --random 30000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    frames: Option<u64>,
     /// Frames of each set whose silently wrong widths are limited
     #[arg(long, value_name = "M", default_value = "30000", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     silent_frames: u64,
     /// Only this set, or with --calibration only this camera; may be given more than once
     #[arg(long = "set", value_name = "NAME")]
     sets: Vec<String>,
-    /// Frames whose parameters are drawn at random: torn edges, holes, grooves, texture,
-    /// ribs, motion, cameras with their faults
-    #[arg(long, conflicts_with = "calibration")]
-    random: bool,
-    /// With --random: keep the first so many frames of each set as pictures/SET-NUMBER.png
-    #[arg(long, value_name = "K", default_value = "0", requires = "random")]
-    pictures: u64,
+    /// Frames whose parameters are drawn at random: all of these sets, or some by name;
+    /// `ribs` names both `ribs-weak` and `ribs-strong`
+    #[arg(long, value_name = "all|NAME[,NAME…]", value_delimiter = ',', conflicts_with_all = ["calibration", "sets"])]
+    random: Vec<String>,
+    /// With --random: keep the first so many frames of each set as frames/SET-NUMBER.png,
+    /// and what was drawn for them as frames/SET.csv
+    #[arg(long, value_name = "K", default_value = "0", requires_all = ["random", "out"])]
+    keep_frames: u64,
     /// Calibrations instead of widths: whether widths scatter as much from one to the
     /// next as each foretells of itself
     #[arg(long)]
@@ -73,7 +77,7 @@ pub struct AccuracyArgs {
     #[arg(long, value_name = "N", default_value = "100", value_parser = parse_trials)]
     rendered_trials: u64,
     /// Folder for accuracy.json and accuracy.md; for calibrations
-    /// calibrations.json and calibrations.md
+    /// calibrations.json and calibrations.md, with --random random.json and random.md
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -83,14 +87,15 @@ pub fn run(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
     if args.calibration {
         return judge_calibrations(args, voice);
     }
-    if args.random {
-        return judge_drawn(args, voice);
+    if !args.random.is_empty() {
+        return random::judge(args, voice);
     }
     let sets = chosen(&args.sets, sets::all(), |set| set.name)?;
     if let Some(out) = &args.out {
         output::make_folder(out)?;
     }
-    let count = |set: &Set| if set.limits_silent() { args.silent_frames } else { args.frames };
+    let frames = args.frames.unwrap_or(FRAMES);
+    let count = |set: &Set| if set.limits_silent() { args.silent_frames } else { frames };
     let total = sets.iter().map(count).sum();
     let progress = Mutex::new(Progress::new("measuring", "frames", Some(total), voice.quiet));
     let figures: Result<Vec<SetFigures>> =
@@ -140,71 +145,6 @@ fn judge_calibrations(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
     say!("{}", calibration::table(&figures).trim_end());
     let missed = figures.iter().any(|figures| !figures.missed.is_empty());
     Ok(if missed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
-}
-
-/// Renders and measures frames whose parameters are drawn.
-fn judge_drawn(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
-    let sets = chosen(&args.sets, drawn::all(), |set| set.name)?;
-    let pictures = match (&args.out, args.pictures) {
-        (_, 0) => None,
-        (Some(out), _) => Some(out.join("pictures")),
-        (None, _) => return Err(WrongArguments::new("--pictures needs --out").into()),
-    };
-    for folder in args.out.iter().chain(&pictures) {
-        output::make_folder(folder)?;
-    }
-    let total = args.silent_frames * u64::try_from(sets.len()).unwrap_or(u64::MAX);
-    let progress = Mutex::new(Progress::new("measuring", "frames", Some(total), voice.quiet));
-    let mut figures = Vec::new();
-    for set in &sets {
-        if let Some(folder) = &pictures {
-            (0..args.pictures).try_for_each(|number| keep_picture(set, number, folder))?;
-        }
-        let outcomes: Result<Vec<DrawnOutcome>> = (0..args.silent_frames)
-            .into_par_iter()
-            .map(|number| {
-                let outcome = measure_drawn(set, number)?;
-                progress.lock().unwrap_or_else(PoisonError::into_inner).advance();
-                Ok(outcome)
-            })
-            .collect();
-        figures.extend(figures_of_drawn::figures(set, &outcomes?));
-    }
-    progress.into_inner().unwrap_or_else(PoisonError::into_inner).finish();
-    if let Some(out) = &args.out {
-        let json = serde_json::to_vec_pretty(&figures).context("random.json")?;
-        output::write_whole(out, "random.json", &json)?;
-        output::write_whole(out, "random.md", figures_of_drawn::markdown(&figures).as_bytes())?;
-    }
-    say!("{}", figures_of_drawn::table(&figures).trim_end());
-    let missed = figures.iter().any(|figures| !figures.missed.is_empty());
-    Ok(if missed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
-}
-
-/// Measures a frame with a measurer of its own: its width comes from it alone.
-fn measure_drawn(set: &DrawnSet, number: u64) -> Result<DrawnOutcome> {
-    let drawn = set.take(number)?;
-    let surface = SurfaceMap::from_scale(1.0);
-    let width = match Measurer::new(drawn.gauge, None).measure(&drawn.frame, &surface) {
-        Ok(found) => Ok(Deviation {
-            error_px: found.width.get() - drawn.truth_px,
-            sigma_px: found.sigma.get(),
-        }),
-        Err(reject) => Err(reject.status()),
-    };
-    Ok(DrawnOutcome { frame: number, parameters: drawn.parameters, width })
-}
-
-fn keep_picture(set: &DrawnSet, number: u64, folder: &Path) -> Result<()> {
-    let drawn = set.take(number)?;
-    let (width, height) = drawn.frame.size();
-    let size = (u32::try_from(width)?, u32::try_from(height)?);
-    let Pixels::Grey8(pixels) = drawn.frame.pixels() else { return Ok(()) };
-    let picture = GrayImage::from_raw(size.0, size.1, pixels.clone()).context("a drawn frame")?;
-    let mut png = Cursor::new(Vec::new());
-    picture.write_to(&mut png, ImageFormat::Png)?;
-    let name = format!("{}-{number:06}.png", set.name);
-    Ok(output::write_whole(folder, &name, png.get_ref()).map(drop)?)
 }
 
 fn judge_rig(rig: &Rig, source: Source, trials: u64, progress: &Mutex<Progress>) -> RigFigures {

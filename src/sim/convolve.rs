@@ -31,15 +31,25 @@ pub fn convolve(values: &mut [f32], width: usize, kernel: &[f32]) {
             }
         }
     }
+    add_lines(&across, values, width, kernel);
+}
+
+/// Convolves along the direction from line to line only.
+pub fn convolve_lines(values: &mut [f32], width: usize, kernel: &[f32]) {
+    let before = values.to_vec();
+    add_lines(&before, values, width, kernel);
+}
+
+fn add_lines(from: &[f32], values: &mut [f32], width: usize, kernel: &[f32]) {
     let height = values.len() / width;
     for (at, sum) in values.chunks_exact_mut(width).enumerate() {
         sum.fill(0.0);
         for (distance, weight) in kernel.iter().enumerate() {
             if at + distance < height {
-                add(sum, &across[(at + distance) * width..][..width], *weight);
+                add(sum, &from[(at + distance) * width..][..width], *weight);
             }
             if 0 < distance && distance <= at {
-                add(sum, &across[(at - distance) * width..][..width], *weight);
+                add(sum, &from[(at - distance) * width..][..width], *weight);
             }
         }
     }

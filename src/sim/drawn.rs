@@ -3,19 +3,23 @@
 //! with their faults. What the measurement was not tuned on.
 //!
 //! ```text
-//! list     the sets: what is drawn from where, and what must be reached
+//! list     the sets and what each must reach
+//! recipes  what is drawn from where
 //! draw     numbers of a frame, with a record of them
+//! scene    what a frame shows
 //! profile  edges that are random lines
-//! scene    what lies where in a frame
-//! paint    its pixels, before the camera
-//! camera   vignetting, motion, blur, gamma, noise, JPEG
+//! outline  where the borders lie on each line, and the area of the bead
+//! paint    light on the sensor: blur, motion, texture
+//! camera   from light to grey levels: vignetting, gamma, noise, JPEG
 //! ```
 
 mod camera;
 mod draw;
 mod list;
+mod outline;
 mod paint;
 mod profile;
+mod recipes;
 mod scene;
 
 use crate::frame::{Frame, Pixels, WrongSize};
@@ -27,7 +31,7 @@ use draw::Draw;
 use scene::Scene;
 
 pub use draw::Parameter;
-pub use list::{DrawnSet, Requirements, all};
+pub use list::{DrawnSet, Requirements, all, named};
 
 /// Narrowest and widest bead that a gauge believes, in the bead's nominal widths.
 const RANGE: (f64, f64) = (0.6, 1.3);
@@ -52,7 +56,7 @@ impl DrawnSet {
         let mut draw = Draw::new(self.name, number);
         let scene = (self.scene)(&mut draw);
         let painted = paint::paint(&scene, &mut draw);
-        let pixels = camera::expose(painted.canvas, &scene, &mut draw);
+        let pixels = camera::expose(&painted.light, &scene, &mut draw);
         let frame = Frame::new(number, Stamp::START, scene.size, Pixels::Grey8(pixels))?;
         let gauge = gauge(&scene, self.knows_gamma);
         Ok(DrawnFrame { frame, gauge, truth_px: painted.truth_px, parameters: draw.record() })

@@ -5,6 +5,12 @@ use super::draw::Draw;
 /// Places of a profile in a pixel.
 pub const PER_PX: usize = 4;
 
+/// Where a place of a profile lies \[px\], from the profile's end.
+#[expect(clippy::cast_precision_loss, reason = "a few thousand places")]
+pub fn height_of(place: usize) -> f64 {
+    (place as f64 + 0.5) / PER_PX as f64
+}
+
 /// Deviations of an edge \[px\], [`PER_PX`] a pixel: of the standard deviation
 /// `roughness_px`, with the autocorrelation exp(−|d|/`length_px`).
 pub fn rough(count: usize, roughness_px: f64, length_px: f64, draw: &mut Draw) -> Vec<f64> {

@@ -12,18 +12,20 @@ pub struct Scene {
     pub bead_grey: f64,
     /// Brightness of the ground.
     pub ground_grey: f64,
+    /// How far its axis lies from the picture's middle at most.
+    pub place_px: f64,
     /// How its edges are torn.
     pub edges: Tear,
-    /// Aggregate on beads.
+    /// Aggregate on beads, as the picture shows it.
     pub texture: Patches,
-    /// Pattern of the ground.
+    /// Pattern of the ground, as the picture shows it.
     pub ground_texture: Patches,
     /// Grooves on either side.
     pub grooves: [Option<Groove>; 2],
     /// Number of holes within the bead, and of bays in its edges, and their size.
     pub holes: Option<Holes>,
-    /// A seam (dark), or a rib or highlight (bright).
-    pub rib: Option<Rib>,
+    /// Seams (dark), ribs and highlights (bright) within the bead.
+    pub ribs: Vec<Rib>,
     /// Sideways motion while the shutter is open.
     pub motion_px: f64,
     /// Standard deviation of the lens's blur.
@@ -96,6 +98,7 @@ impl Default for Scene {
         Self {
             size: (640, 100),
             width_px: 332.0,
+            place_px: 1.0,
             bead_grey: 150.0,
             ground_grey: 70.0,
             edges: Tear { roughness_px: 0.0, length_px: 10.0 },
@@ -103,7 +106,7 @@ impl Default for Scene {
             ground_texture: none,
             grooves: [None; 2],
             holes: None,
-            rib: None,
+            ribs: Vec::new(),
             motion_px: 0.0,
             blur_px: 1.5,
             vignetting: 1.0,
