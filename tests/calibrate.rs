@@ -20,7 +20,12 @@ use truebead::units::Mm;
 /// Thirteen pictures of a board with 9x6 inner corners, of squares of 25 mm, if
 /// they are there.
 fn chessboard() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/chessboard");
+    sample("chessboard")
+}
+
+/// A folder of real pictures beside the project, if it is there.
+fn sample(name: &str) -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(name);
     if !folder.is_dir() {
         eprintln!("skipped: the pictures of the board are not at {}", folder.display());
         return None;
@@ -52,6 +57,16 @@ fn the_camera_of_the_real_pictures_is_found() {
     // The focal length that OpenCV's own samples give for these pictures.
     assert!((camera.focal_px[0] - 532.83).abs() < 0.8, "fx {}", camera.focal_px[0]);
     assert!((camera.centre_px[0] - 342.5).abs() < 1.5 && (camera.centre_px[1] - 233.9).abs() < 1.5);
+}
+
+/// In one of them the board is close to the edge of the picture.
+#[test]
+fn every_picture_of_the_other_camera_is_used() {
+    let Some(folder) = sample("chessboard_right") else { return };
+    let scratch = tempfile::tempdir().unwrap();
+    let run = calibrate(&folder, &scratch.path().join("calib.toml"), &[]).assert().success();
+    let said = said(&run);
+    assert!(said.contains("13 of 13 images show the board"), "{said}");
 }
 
 #[test]
