@@ -25,6 +25,7 @@ pub mod next_view;
 pub mod offset;
 pub mod outline;
 pub mod plane;
+mod pull;
 pub mod quality;
 pub mod refusal;
 pub mod scale;
@@ -33,7 +34,9 @@ pub mod sighting;
 pub mod solve;
 #[cfg(test)]
 mod synthetic;
+pub mod uncertainty;
 pub mod verify;
 
 pub use camera::Camera;
 pub use model::{Calibration, Quality, SurfaceMap};
+pub use uncertainty::Uncertainty;
