@@ -30,6 +30,7 @@ pub mod quality;
 pub mod refusal;
 pub mod scale;
 pub mod share;
+pub mod share_map;
 pub mod sighting;
 pub mod solve;
 #[cfg(test)]

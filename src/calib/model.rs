@@ -178,6 +178,11 @@ impl SurfaceMap {
         self.with_height(Some(uncertainty.share([&first?, &last?])?))
     }
 
+    /// What is left open in camera and bed plane behind the map, if it is known.
+    pub fn uncertainty(&self) -> Option<&Uncertainty> {
+        self.uncertainty.as_ref()
+    }
+
     fn with_height(&self, share: Option<f64>) -> Option<f64> {
         match (share, self.height_share) {
             (Some(share), Some(of_height)) => Some(share.hypot(of_height)),

@@ -1,6 +1,7 @@
 //! `report.html` of a calibration: where boards were seen, what is left between seen
 //! and expected, and what a width is known to, all over the picture.
 
+pub mod cell;
 mod drawing;
 
 use maud::{Markup, html};
