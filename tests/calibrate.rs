@@ -234,6 +234,35 @@ fn pictures_that_are_no_good_are_left_out_and_say_why() {
 }
 
 #[test]
+fn check_draws_what_is_left_open_with_the_gauge_and_knows_older_files() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path().join("pictures");
+    pictures(&folder);
+    let out = scratch.path().join("calib.toml");
+    calibrate(&folder, &out, &[]).assert().success();
+    let cell = scratch.path().join("cell.toml");
+    let text = "[calibration]\nfile = \"calib.toml\"\nsurface_height_mm = 10.0\n[gauge]\n\
+                roi_px = [100, 210, 400, 50]\nbead_axis = \"vertical\"\npolarity = \"bright\"\n\
+                width_range_mm = [20.0, 60.0]\n";
+    fs::write(&cell, text).unwrap();
+    let check = |more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_truebead"));
+        said(&command.arg("check").arg(&cell).args(more).assert().success())
+    };
+    let page = scratch.path().join("check.html");
+    let told = check(&["--report", page.to_str().unwrap()]);
+    assert!(told.contains("in the middle of the gauge"), "{told}");
+    // Two in the words, and five cells that the gauge covers.
+    assert_eq!(told.matches('[').count(), 2 + 5, "{told}");
+    assert!(fs::read_to_string(page).unwrap().contains("Solid: the gauge"));
+    let old = fs::read_to_string(&out).unwrap();
+    let (old, _) = old.split_once("[uncertainty]").unwrap();
+    fs::write(&out, old).unwrap();
+    let told = check(&[]);
+    assert!(told.contains("number for the whole image"), "{told}");
+}
+
+#[test]
 fn a_calibration_passes_or_fails_by_what_it_leaves_in_a_width() {
     let scratch = tempfile::tempdir().unwrap();
     let folder = scratch.path().join("pictures");
