@@ -116,11 +116,11 @@ fn held_out_px(views: &Views, fit: &Fit, free: Free) -> Option<f64> {
     let each = Pull::all(views, fit, free)?;
     let all: SMatrix<f64, SHARED, SHARED> = each.iter().map(|one| one.left).sum();
     let mut squares = 0.0;
-    for Pull { left, pull, squares_px2 } in each {
+    for Pull { left, score, squares_px2 } in each {
         let rest = Factor::of_shared(&only(all - left, free))?;
-        let moved = rest.solve(&DVector::from_column_slice(pull.as_slice()));
+        let moved = rest.solve(&DVector::from_column_slice(score.as_slice()));
         let moved = SVector::<f64, SHARED>::from_fn(|row, _| moved[row]);
-        squares += squares_px2 + 2.0 * pull.dot(&moved) + (moved.transpose() * left * moved)[0];
+        squares += squares_px2 + 2.0 * score.dot(&moved) + (moved.transpose() * left * moved)[0];
     }
     Some(views.rms_px(squares))
 }

@@ -12,9 +12,9 @@ use super::solve::{Views, only};
 pub struct Pull {
     /// Information on the shared numbers, in units of one over the noise's variance.
     pub left: SMatrix<f64, SHARED, SHARED>,
-    /// Its gradient (score): which way this picture alone would move them. At the best fit
+    /// Its gradient: which way this picture alone would move them. At the best fit
     /// all of them together are 0.
-    pub pull: SVector<f64, SHARED>,
+    pub score: SVector<f64, SHARED>,
     /// Sum of the squares of its residuals \[px²\].
     pub squares_px2: f64,
 }
@@ -27,11 +27,11 @@ impl Pull {
             let equations = Equations::of(&fit.model, free, place, boards)?;
             let elimination = Elimination::of(&equations)?;
             let known = elimination.place.solve(&equations.place_side);
-            let pull = DVector::from_column_slice(equations.shared_side.as_slice())
+            let score = DVector::from_column_slice(equations.shared_side.as_slice())
                 - equations.both.transpose() * known;
             Some(Self {
                 left: elimination.left,
-                pull: SVector::from_fn(|row, _| pull[row]),
+                score: SVector::from_fn(|row, _| score[row]),
                 squares_px2: equations.squares_px2,
             })
         })
@@ -45,8 +45,8 @@ impl Pull {
 ///
 /// What bends all corners of a picture alike (a board that is not quite flat, a lens that
 /// no model describes, light that moves edges) makes its score gᵥ larger than the noise σ²
-/// of a corner explains. With S = ΣSᵥ and independent corners, Σ gᵥᵀS⁻¹gᵥ has the mean
-/// σ²(p − Σ tr(S⁻¹SᵥS⁻¹Sᵥ)) at the best fit of p numbers; the ratio of both is the effect.
+/// of a corner explains. With `S = ΣSᵥ` and independent corners, `Σ gᵥᵀS⁻¹gᵥ` has the mean
+/// `σ²(p − Σ tr(S⁻¹SᵥS⁻¹Sᵥ))` at the best fit of p numbers; the ratio of both is the effect.
 /// The cluster-robust covariance (Liang and Zeger 1986) has the same scores and a matrix
 /// where this has a number, which so few pictures tell better. No less than 1. `None`
 /// where the pictures do not settle the numbers.
@@ -55,11 +55,11 @@ pub fn design_effect(pulls: &[Pull], free: Free, noise_variance_px2: f64) -> Opt
     let inverse = Factor::of_shared(&only(all, free))?;
     let (mut found, mut used) = (0.0, 0.0);
     for one in pulls {
-        let pull = DVector::from_iterator(
+        let score = DVector::from_iterator(
             SHARED,
-            (0..SHARED).map(|number| if free.has(number) { one.pull[number] } else { 0.0 }),
+            (0..SHARED).map(|number| if free.has(number) { one.score[number] } else { 0.0 }),
         );
-        found += pull.dot(&inverse.solve(&pull));
+        found += score.dot(&inverse.solve(&score));
         let left = only(one.left, free);
         let part = DMatrix::from_columns(
             &left

@@ -179,6 +179,7 @@ fn check(args: &ConvertArgs, to: To) -> Result<(), WrongArguments> {
 }
 
 /// What is converted.
+#[expect(clippy::large_enum_variant, reason = "there is one, read once")]
 enum Source {
     /// A calibration of ours: what others can hold of it, and what the pictures said.
     Truebead(Intrinsics, Option<Quality>),

@@ -10,7 +10,7 @@ use crate::calib::covariance::Covariance;
 use crate::calib::plane::{OnBed, bed_from_board};
 use crate::calib::sighting::{self, Sighting};
 use crate::calib::solve::{self, Solution};
-use crate::calib::{Calibration, Camera, Quality, Uncertainty};
+use crate::calib::{Calibration, Camera, Quality};
 use crate::geometry::{ImagePoint, Pose};
 use crate::units::Mm;
 
@@ -145,7 +145,7 @@ impl Bench {
         let on_bed = OnBed::fit(&solution.model, vec![board.place(&sightings.last()?.corners)])?;
         let covariance = Covariance::of(board, &solution, &on_bed, Mm::ZERO)?;
         let heights = [Mm::ZERO, Mm::new(0.05 * self.rig.distance_mm).ok()?];
-        let calibration = self.calibration(&solution, &on_bed, covariance.uncertainty());
+        let calibration = self.calibration(&solution, &on_bed, &covariance);
         let beads = heights.into_iter().flat_map(|height| cells().map(move |at| (height, at)));
         beads
             .enumerate()
@@ -164,7 +164,7 @@ impl Bench {
         &self,
         solution: &Solution,
         on_bed: &OnBed,
-        uncertainty: Uncertainty,
+        covariance: &Covariance,
     ) -> Calibration {
         Calibration::Full {
             image_size_px: self.rig.image_size_px,
@@ -176,7 +176,7 @@ impl Bench {
                 width_sigma_share: None,
                 seen_px: None,
                 heights_mm: None,
-                uncertainty: Some(uncertainty),
+                uncertainty: Some(covariance.uncertainty()),
             }),
         }
     }

@@ -27,14 +27,12 @@ pub fn tell(loaded: &LoadedCell, page: Option<&Path>) -> anyhow::Result<()> {
     let surface = loaded.surface(None);
     let bead = bead(loaded);
     let Some(text) = ShareMap::of(&surface, &bead, TEXT_CELLS) else {
-        match surface.width_sigma_share() {
-            Some(share) => {
-                say!("  sigma        the calibration leaves {:.3} % of every width open: one", {
-                    100.0 * share
-                });
-                say!("               number for the whole image; `calibrate` anew makes a map");
-            }
-            None => say!("  sigma        what the calibration leaves in a width is not known"),
+        if let Some(share) = surface.width_sigma_share() {
+            let percent = 100.0 * share;
+            say!("  sigma        the calibration leaves {percent:.3} % of every width open: one");
+            say!("               number for the whole image; `calibrate` anew makes a map");
+        } else {
+            say!("  sigma        what the calibration leaves in a width is not known");
         }
         anyhow::ensure!(page.is_none(), "--report: the calibration file has no [uncertainty]");
         return Ok(());
@@ -96,8 +94,9 @@ fn lines(map: &ShareMap, gauge: Roi) -> Vec<String> {
         let [left, top, right, bottom] = map.cell_px(cell);
         (f64::midpoint(left, right), f64::midpoint(top, bottom))
     };
-    let head: String = (0..columns).map(|column| format!("{:>8.0}", middle(column).0)).collect();
-    let mut lines = vec![format!("{:>6}{head}", "px")];
+    let heads: Vec<String> =
+        (0..columns).map(|column| format!("{:>8.0}", middle(column).0)).collect();
+    let mut lines = vec![format!("{:>6}{}", "px", heads.concat())];
     for row in 0..rows {
         let cells: String = (0..columns)
             .map(|column| {
