@@ -92,7 +92,7 @@ pub fn lens(solution: &Solution) -> String {
     out
 }
 
-/// Design effect from which on it is no chance: its own standard error is some 0.15 with a
+/// Design effect from which on it is no chance: its own standard error is some 0.16 with a
 /// dozen pictures.
 const TOLD_EFFECT: f64 = 1.5;
 /// Letters of the longest name of a number.
