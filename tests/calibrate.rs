@@ -52,7 +52,8 @@ fn the_camera_of_the_real_pictures_is_found() {
     let Calibration::Full { camera, quality, .. } = &calibration else { unreachable!() };
     assert!(quality.unwrap().reprojection_rms_px <= 0.20);
     let share = quality.unwrap().width_sigma_share.unwrap();
-    assert!((1e-4..1e-2).contains(&share), "{share}");
+    // The largest where boards were seen, with the design effect of a board that is bent.
+    assert!((1e-4..2e-2).contains(&share), "{share}");
     assert!(said.contains("a width is known to"), "{said}");
     // The focal length that OpenCV's own samples give for these pictures.
     assert!((camera.focal_px[0] - 532.83).abs() < 0.8, "fx {}", camera.focal_px[0]);
@@ -252,8 +253,9 @@ fn check_draws_what_is_left_open_with_the_gauge_and_knows_older_files() {
     let page = scratch.path().join("check.html");
     let told = check(&["--report", page.to_str().unwrap()]);
     assert!(told.contains("in the middle of the gauge"), "{told}");
-    // Two in the words, and five cells that the gauge covers.
-    assert_eq!(told.matches('[').count(), 2 + 5, "{told}");
+    // Rows are named by their middles; the gauge covers five cells of one.
+    let row = told.lines().find(|line| line.trim_start().starts_with("200 "));
+    assert_eq!(row.unwrap().matches('[').count(), 5, "{told}");
     assert!(fs::read_to_string(page).unwrap().contains("Solid: the gauge"));
     let old = fs::read_to_string(&out).unwrap();
     let (old, _) = old.split_once("[uncertainty]").unwrap();
