@@ -25,15 +25,19 @@ pub mod next_view;
 pub mod offset;
 pub mod outline;
 pub mod plane;
+mod pull;
 pub mod quality;
 pub mod refusal;
 pub mod scale;
 pub mod share;
+pub mod share_map;
 pub mod sighting;
 pub mod solve;
 #[cfg(test)]
 mod synthetic;
+pub mod uncertainty;
 pub mod verify;
 
 pub use camera::Camera;
 pub use model::{Calibration, Quality, SurfaceMap};
+pub use uncertainty::Uncertainty;

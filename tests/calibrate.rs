@@ -20,7 +20,12 @@ use truebead::units::Mm;
 /// Thirteen pictures of a board with 9x6 inner corners, of squares of 25 mm, if
 /// they are there.
 fn chessboard() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/chessboard");
+    sample("chessboard")
+}
+
+/// A folder of real pictures beside the project, if it is there.
+fn sample(name: &str) -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(name);
     if !folder.is_dir() {
         eprintln!("skipped: the pictures of the board are not at {}", folder.display());
         return None;
@@ -47,11 +52,22 @@ fn the_camera_of_the_real_pictures_is_found() {
     let Calibration::Full { camera, quality, .. } = &calibration else { unreachable!() };
     assert!(quality.unwrap().reprojection_rms_px <= 0.20);
     let share = quality.unwrap().width_sigma_share.unwrap();
-    assert!((1e-4..1e-2).contains(&share), "{share}");
+    // The largest where boards were seen, with the design effect of a board that is bent.
+    assert!((1e-4..2e-2).contains(&share), "{share}");
     assert!(said.contains("a width is known to"), "{said}");
     // The focal length that OpenCV's own samples give for these pictures.
     assert!((camera.focal_px[0] - 532.83).abs() < 0.8, "fx {}", camera.focal_px[0]);
     assert!((camera.centre_px[0] - 342.5).abs() < 1.5 && (camera.centre_px[1] - 233.9).abs() < 1.5);
+}
+
+/// In one of them the board is close to the edge of the picture.
+#[test]
+fn every_picture_of_the_other_camera_is_used() {
+    let Some(folder) = sample("chessboard_right") else { return };
+    let scratch = tempfile::tempdir().unwrap();
+    let run = calibrate(&folder, &scratch.path().join("calib.toml"), &[]).assert().success();
+    let said = said(&run);
+    assert!(said.contains("13 of 13 images show the board"), "{said}");
 }
 
 #[test]
@@ -216,6 +232,36 @@ fn pictures_that_are_no_good_are_left_out_and_say_why() {
     let quality = quality.unwrap();
     assert!(quality.reprojection_rms_px < 0.03 && quality.width_sigma_share.unwrap() < 5e-4);
     assert!(quality.seen_px.is_some() && quality.heights_mm.is_some());
+}
+
+#[test]
+fn check_draws_what_is_left_open_with_the_gauge_and_knows_older_files() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path().join("pictures");
+    pictures(&folder);
+    let out = scratch.path().join("calib.toml");
+    calibrate(&folder, &out, &[]).assert().success();
+    let cell = scratch.path().join("cell.toml");
+    let text = "[calibration]\nfile = \"calib.toml\"\nsurface_height_mm = 10.0\n[gauge]\n\
+                roi_px = [100, 210, 400, 50]\nbead_axis = \"vertical\"\npolarity = \"bright\"\n\
+                width_range_mm = [20.0, 60.0]\n";
+    fs::write(&cell, text).unwrap();
+    let check = |more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_truebead"));
+        said(&command.arg("check").arg(&cell).args(more).assert().success())
+    };
+    let page = scratch.path().join("check.html");
+    let told = check(&["--report", page.to_str().unwrap()]);
+    assert!(told.contains("in the middle of the gauge"), "{told}");
+    // Rows are named by their middles; the gauge covers five cells of one.
+    let row = told.lines().find(|line| line.trim_start().starts_with("200 "));
+    assert_eq!(row.unwrap().matches('[').count(), 5, "{told}");
+    assert!(fs::read_to_string(page).unwrap().contains("Solid: the gauge"));
+    let old = fs::read_to_string(&out).unwrap();
+    let (old, _) = old.split_once("[uncertainty]").unwrap();
+    fs::write(&out, old).unwrap();
+    let told = check(&[]);
+    assert!(told.contains("number for the whole image"), "{told}");
 }
 
 #[test]

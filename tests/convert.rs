@@ -49,6 +49,7 @@ fn calibration(path: &Path) {
         width_sigma_share: Some(4e-4),
         seen_px: Some([3.0, 4.0, 630.0, 470.0]),
         heights_mm: Some([0.0, 50.0]),
+        uncertainty: None,
     };
     let bed = Pose::new(Vector3::new(3.0, 0.1, -0.2), Vector3::new(1.5, -2.25, 400.125));
     let text = file::to_toml((&camera(), &bed), SIZE, Mm::ZERO, Some(quality), &[]);

@@ -104,6 +104,7 @@ fn the_calibrations_share_is_in_the_sigma_of_each_width_and_in_nothing_else() {
         width_sigma_share: Some(SHARE),
         seen_px: None,
         heights_mm: None,
+        uncertainty: None,
     });
     let frame = Series::new(&cell, calibration.clone()).unwrap().render(0).unwrap().frame;
     for method in [Method::Caliper, Method::EdgeLines] {

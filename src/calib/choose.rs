@@ -5,8 +5,9 @@
 use nalgebra::{DVector, SMatrix, SVector};
 
 use super::bundle::{self, Fit};
-use super::equations::{Elimination, Equations, Factor, Free, SHARED};
+use super::equations::{Factor, Free, SHARED};
 use super::lens::Lens;
+use super::pull::Pull;
 use super::solve::{Views, only};
 
 /// Share of the smallest held-out error by which a lens may foretell worse and be
@@ -112,23 +113,14 @@ fn trial(views: &Views, fit: &Fit, free: Free) -> Trial {
 /// goes by ds = −(S − Sᵥ)⁻¹gᵥ, with S all pictures' equations, poses eliminated, and
 /// Sᵥ and gᵥ its own; of its errors that leaves |r|² + 2 gᵥᵀ(S − Sᵥ)⁻¹gᵥ + dsᵀSᵥds.
 fn held_out_px(views: &Views, fit: &Fit, free: Free) -> Option<f64> {
-    let mut all = SMatrix::<f64, SHARED, SHARED>::zeros();
-    let mut each = Vec::with_capacity(fit.places.len());
-    for (place, boards) in fit.places.iter().zip(&views.boards) {
-        let equations = Equations::of(&fit.model, free, place, boards)?;
-        let elimination = Elimination::of(&equations)?;
-        let known = elimination.place.solve(&equations.place_side);
-        let pull = DVector::from_column_slice(equations.shared_side.as_slice())
-            - equations.both.transpose() * known;
-        all += elimination.left;
-        each.push((elimination.left, pull, equations.squares_px2));
-    }
+    let each = Pull::all(views, fit, free)?;
+    let all: SMatrix<f64, SHARED, SHARED> = each.iter().map(|one| one.left).sum();
     let mut squares = 0.0;
-    for (own, pull, own_squares) in each {
-        let rest = Factor::of_shared(&only(all - own, free))?;
-        let moved = rest.solve(&pull);
-        let fixed = SVector::<f64, SHARED>::from_fn(|row, _| moved[row]);
-        squares += own_squares + 2.0 * pull.dot(&moved) + (fixed.transpose() * own * fixed)[0];
+    for Pull { left, score, squares_px2 } in each {
+        let rest = Factor::of_shared(&only(all - left, free))?;
+        let moved = rest.solve(&DVector::from_column_slice(score.as_slice()));
+        let moved = SVector::<f64, SHARED>::from_fn(|row, _| moved[row]);
+        squares += squares_px2 + 2.0 * score.dot(&moved) + (moved.transpose() * left * moved)[0];
     }
     Some(views.rms_px(squares))
 }

@@ -10,10 +10,12 @@
 use nalgebra::{DMatrix, DVector, Point3, SMatrix, SVector};
 
 use super::board::Board;
+use super::camera::NUMBERS;
 use super::equations::{Corner, Elimination, Equations, Factor, Free, Model, POSE, Place, SHARED};
 use super::plane::{OnBed, bed_from_board};
 use super::scale;
 use super::solve::{Solution, only};
+use super::uncertainty::{Joint, UNCERTAIN, Uncertainty};
 use super::{Calibration, SurfaceMap};
 use crate::geometry::{ImagePoint, Pose};
 use crate::units::Mm;
@@ -64,7 +66,7 @@ impl Covariance {
             let corners = solution.corners(board, number);
             left += eliminate(&model, free, &Place::of_one(view.pose), &[corners])?.left;
         }
-        let noise_variance_px2 = solution.noise_px * solution.noise_px;
+        let noise_variance_px2 = solution.noise_px.powi(2) * solution.design_effect;
         let left = only(left, free);
         Some(Self {
             model,
@@ -162,6 +164,44 @@ impl Covariance {
         (self.noise_variance_px2 * (whitened.norm_squared() + reading.of_bed)).sqrt()
     }
 
+    /// What is left open in camera and bed plane together.
+    pub fn uncertainty(&self) -> Uncertainty {
+        self.joint(1.0)
+    }
+
+    /// The same without what the noise of the bed's own corners adds: two cameras that see
+    /// the same board share that.
+    pub fn uncertainty_of_camera(&self) -> Uncertainty {
+        self.joint(0.0)
+    }
+
+    /// With so many times the variance of the corners of the boards on the bed.
+    ///
+    /// The bed's pose answers to the shared numbers s as b = −V⁻¹W·s, with V its own
+    /// equations and W those of both; its own corners add V⁻¹.
+    fn joint(&self, own: f64) -> Uncertainty {
+        let numbers = self.bed.numbers();
+        let own_root = self.of_bed.place.whiten(&DMatrix::identity(numbers, numbers));
+        let follows = (own_root.transpose() * &self.of_bed.follows).rows(0, POSE).into_owned();
+        let mut answers = DMatrix::zeros(UNCERTAIN, SHARED);
+        answers.view_mut((0, 0), (NUMBERS, NUMBERS)).fill_with_identity();
+        answers.rows_mut(NUMBERS, POSE).copy_from(&-follows);
+        let of_shared = self.of_shared.whiten(&answers.transpose());
+        let mut joint = of_shared.transpose() * of_shared;
+        let pose = own_root.columns(0, POSE);
+        let mut of_bed = joint.view_mut((NUMBERS, NUMBERS), (POSE, POSE));
+        of_bed += pose.transpose() * pose * own;
+        joint *= self.noise_variance_px2;
+        // From the board's origin to the bed's, about which the bed turns.
+        let face = &self.bed.pose;
+        let bed = bed_from_board(face, self.thickness);
+        let arm = bed.translation_mm() - face.translation_mm();
+        let mut moved = DMatrix::identity(UNCERTAIN, UNCERTAIN);
+        moved.view_mut((NUMBERS + 3, NUMBERS), (3, 3)).copy_from(&-arm.cross_matrix());
+        let joint = &moved * joint * moved.transpose();
+        Uncertainty::of(&Joint::from_fn(|row, column| joint[(row, column)]))
+    }
+
     /// The map of a surface.
     pub fn surface(&self, surface_height: Mm) -> SurfaceMap {
         self.map(&self.model, &self.bed, surface_height)
@@ -235,6 +275,7 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
 
+    use crate::calib::Quality;
     use crate::calib::lens::Lens;
     use crate::calib::share;
     use crate::calib::solve;
@@ -304,6 +345,33 @@ mod tests {
                 let foretold = (sigmas.iter().map(|s| s * s).sum::<f64>() / SEEDS as f64).sqrt();
                 let ratio = scatter / foretold;
                 assert!((0.9..1.1).contains(&ratio), "bed {which}, {ends:?}: {ratio}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_joint_covariance_says_what_each_width_does() {
+        let (solution, beds) = solved(6);
+        for bed in &beds {
+            let covariance = covariance(&solution, bed);
+            let quality = Quality {
+                reprojection_rms_px: solution.rms_px,
+                width_sigma_share: None,
+                seen_px: None,
+                heights_mm: None,
+                uncertainty: Some(covariance.uncertainty()),
+            };
+            let calibration = Calibration::Full {
+                image_size_px: SIZE,
+                camera: *solution.camera(),
+                bed: bed.bed(THICKNESS),
+                robot_z: Mm::ZERO,
+                quality: Some(quality),
+            };
+            for (ends, height) in beads() {
+                let (width, sigma) = covariance.width_mm(ends, height).unwrap();
+                let share = calibration.surface(height, None).width_sigma_share_of(ends).unwrap();
+                assert!((share * width / sigma - 1.0).abs() < 1e-4, "{share} {sigma} {width}");
             }
         }
     }

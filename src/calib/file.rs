@@ -7,6 +7,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::camera::COEFFICIENTS;
 use super::lens::Lens;
+use super::uncertainty::{self, Uncertainty};
 use super::{Calibration, Camera, Quality};
 use crate::document::Problems;
 use crate::document::{Document, Table};
@@ -23,6 +24,8 @@ pub(super) const DISTORTION: std::ops::RangeInclusive<f64> = -1e6..=1e6;
 const TURN_RAD: std::ops::RangeInclusive<f64> = -6.3..=6.3;
 const LENGTH_MM: std::ops::RangeInclusive<f64> = -1e6..=1e6;
 pub(super) const RMS_PX: std::ops::RangeInclusive<f64> = 0.0..=1e3;
+/// Standard deviations, in the units of their numbers, and parts of them.
+const FACTOR: std::ops::RangeInclusive<f64> = -1e9..=1e9;
 /// A calibration that leaves more than the width itself open is none.
 const SHARE: std::ops::RangeInclusive<f64> = 0.0..=1.0;
 
@@ -43,6 +46,10 @@ fn read_root(root: &Table<'_>) -> Option<Calibration> {
     let camera = root.required_table("camera").and_then(|table| read_camera(&table, size));
     let bed = root.required_table("bed").and_then(|table| read_bed(&table));
     let quality = root.table("quality").map(|table| read_quality(&table));
+    let uncertainty = root.table("uncertainty").map(|table| read_uncertainty(&table));
+    if uncertainty.is_some() && quality.is_none() {
+        root.report("uncertainty", "no [quality] beside it", "a table [quality]");
+    }
     let (bed, robot_z) = bed?;
     version?;
     Some(Calibration::Full {
@@ -51,10 +58,31 @@ fn read_root(root: &Table<'_>) -> Option<Calibration> {
         bed,
         robot_z,
         quality: match quality {
-            Some(quality) => Some(quality?),
+            Some(quality) => Some(Quality {
+                uncertainty: match uncertainty {
+                    Some(uncertainty) => Some(uncertainty?),
+                    None => None,
+                },
+                ..quality?
+            }),
             None => None,
         },
     })
+}
+
+/// Each row is as long as its number counted from 1; one that is missing is known.
+fn read_uncertainty(table: &Table<'_>) -> Option<Uncertainty> {
+    let mut is_sound = true;
+    let rows = std::array::from_fn(|row| {
+        let name = uncertainty::ROWS[row];
+        if !table.has(name) {
+            return Vec::new();
+        }
+        let values = table.row(name, &[row + 1], FACTOR);
+        is_sound &= values.is_some();
+        values.unwrap_or_default()
+    });
+    is_sound.then(|| Uncertainty::from_rows(&rows)).flatten()
 }
 
 fn read_quality(table: &Table<'_>) -> Option<Quality> {
@@ -62,7 +90,13 @@ fn read_quality(table: &Table<'_>) -> Option<Quality> {
     let width_sigma_share = table.optional_number("width_sigma_share", SHARE);
     let seen_px = table.optional_numbers::<4>("seen_px", CENTRE_PX);
     let heights_mm = table.optional_numbers::<2>("heights_mm", LENGTH_MM);
-    Some(Quality { reprojection_rms_px: rms?, width_sigma_share, seen_px, heights_mm })
+    Some(Quality {
+        reprojection_rms_px: rms?,
+        width_sigma_share,
+        seen_px,
+        heights_mm,
+        uncertainty: None,
+    })
 }
 
 #[expect(
@@ -170,6 +204,27 @@ pub fn to_toml(
                 "heights_mm = {heights:?} # lowest and highest corner of the boards above the bed"
             );
         }
+        if let Some(uncertainty) = quality.uncertainty {
+            text.push_str(&uncertainty_text(&uncertainty));
+        }
+    }
+    text
+}
+
+/// What is left open, as a table.
+fn uncertainty_text(uncertainty: &Uncertainty) -> String {
+    let mut text =
+        "\n[uncertainty] # rows of the triangular L; camera and bed have the covariance \
+                    L * transpose(L)\n"
+            .to_owned();
+    for (name, values) in uncertainty.rows() {
+        let unit = match name {
+            "fx" | "fy" | "cx" | "cy" => " # px",
+            "turn_x" => " # rad, about the camera's axes at the bed's origin",
+            "shift_x" => " # mm, along the camera's axes",
+            _ => "",
+        };
+        let _ = writeln!(text, "{name} = {values:?}{unit}");
     }
     text
 }
@@ -183,6 +238,34 @@ mod tests {
 
     fn said(text: &str) -> String {
         parse("calib.toml", text).unwrap_err().to_string()
+    }
+
+    /// Of all numbers but k4 k5 k6.
+    fn some_covariance() -> uncertainty::Joint {
+        uncertainty::Joint::from_fn(|row, column| {
+            let is_known = |number: usize| (9..12).contains(&number);
+            let unit = |number: usize| if is_known(number) { 0.0 } else { 1.0 / 3.0 };
+            let (row_unit, column_unit) = (unit(row), unit(column));
+            if row == column { row_unit } else { 0.3 * row_unit * column_unit }
+        })
+    }
+
+    #[test]
+    fn the_uncertainty_is_read_row_by_row_and_refused_if_one_is_too_short() {
+        let with = |row: &str| format!("{EXAMPLE}\n[uncertainty]\nfx = [2.5]\n{row}\n");
+        let share = |text: &str| {
+            let map = parse("x", text).unwrap().surface(Mm::ZERO, None);
+            let ends = [Point2::new(300.0, 269.5), Point2::new(400.0, 269.5)];
+            map.width_sigma_share_of(ends).unwrap()
+        };
+        // A focal length along x that is 0.1 % off, and a bed that is 0.1 % further away.
+        assert!((share(&with("")) - 1e-3).abs() < 1e-9, "{}", share(&with("")));
+        let zeros = "0.0, ".repeat(17);
+        let shifted = share(&with(&format!("shift_z = [{zeros} 0.4]")));
+        assert!((shifted - 1e-3 * 2.0_f64.sqrt()).abs() < 1e-9, "{shifted}");
+        let short = said(&with("fy = [1.0]"));
+        assert!(short.contains("uncertainty.fy") && short.contains("2 numbers"), "{short}");
+        assert!(said(&with("fz = [1.0]")).contains("uncertainty.fz: found an unknown key"));
     }
 
     #[test]
@@ -208,6 +291,7 @@ mod tests {
             width_sigma_share: Some(0.000_567),
             seen_px: Some([3.25, 4.0, 630.5, 470.125]),
             heights_mm: Some([-1.5, 120.0]),
+            uncertainty: Some(Uncertainty::of(&some_covariance())),
         });
         let notes = ["made by hand\nfor a test".to_string()];
         let text = to_toml((&camera, &bed), [640, 480], Mm::constant(12.5), quality, &notes);

@@ -3,6 +3,7 @@
 
 use nalgebra::Vector2;
 
+use super::SurfaceMap;
 use super::covariance::Covariance;
 use crate::geometry::ImagePoint;
 use crate::units::Mm;
@@ -89,30 +90,33 @@ fn beads(
     bead_mm: f64,
     surface_height: Mm,
 ) -> impl Iterator<Item = [Option<[ImagePoint; 2]>; 2]> {
-    let (columns, rows) = CELLS;
-    let size = covariance.image_size_px().map(f64::from);
-    let middle = move |i: u32| {
-        let part = |at: u32, count: u32| (f64::from(at) + 0.5) / f64::from(count);
-        let (x, y) = (part(i % columns, columns), part(i / columns, rows));
-        ImagePoint::new(x * size[0] - 0.5, y * size[1] - 0.5)
-    };
+    let map = covariance.surface(surface_height);
+    middles(covariance.image_size_px().map(f64::from), CELLS).map(move |middle| {
+        [Vector2::x(), Vector2::y()].map(|along| ends(&map, middle, along, bead_mm))
+    })
+}
+
+/// Middles of so many cells along and across an image of this size \[px\], row by row.
+pub(super) fn middles(
+    size_px: [f64; 2],
+    (columns, rows): (u32, u32),
+) -> impl Iterator<Item = ImagePoint> {
+    let part = |at: u32, count: u32| (f64::from(at) + 0.5) / f64::from(count);
     (0..columns * rows).map(move |i| {
-        [Vector2::x(), Vector2::y()]
-            .map(|along| ends(covariance, middle(i), along, bead_mm, surface_height))
+        let (x, y) = (part(i % columns, columns), part(i / columns, rows));
+        ImagePoint::new(x * size_px[0] - 0.5, y * size_px[1] - 0.5)
     })
 }
 
 /// Ends of a bead of this width about a middle, along one axis of the picture.
-/// `None` where it is not seen whole.
-fn ends(
-    covariance: &Covariance,
+/// `None` where it is not seen whole, or the map knows no size of the picture.
+pub(super) fn ends(
+    map: &SurfaceMap,
     middle: ImagePoint,
     along: Vector2<f64>,
     bead_mm: f64,
-    surface_height: Mm,
 ) -> Option<[ImagePoint; 2]> {
-    let map = covariance.surface(surface_height);
-    let [right, bottom] = covariance.image_size_px().map(|px| f64::from(px) - 1.0);
+    let [right, bottom] = map.image_size_px()?.map(|px| f64::from(px) - 1.0);
     let at = map.to_mm(middle)?;
     let way = (map.to_mm(middle + along)? - at).normalize() * (bead_mm / 2.0);
     let ends = [map.to_px(at - way)?, map.to_px(at + way)?];

@@ -4,6 +4,7 @@
 use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
 
 use super::Camera;
+use super::uncertainty::{PositionSlopes, Uncertainty};
 use crate::geometry::{ImagePoint, Pose, SurfacePoint};
 use crate::units::Mm;
 
@@ -20,6 +21,10 @@ pub struct Quality {
     pub seen_px: Option<[f64; 4]>,
     /// Lowest and highest corner of the boards above the bed \[mm\]. Files may lack it.
     pub heights_mm: Option<[f64; 2]>,
+    /// What is left open in camera and bed plane: from it comes the standard deviation of
+    /// a width wherever it is seen. Files may lack it; then `width_sigma_share` holds
+    /// everywhere.
+    pub uncertainty: Option<Uncertainty>,
 }
 
 /// What a pixel means in millimetres.
@@ -69,7 +74,17 @@ impl Calibration {
         SurfaceMap {
             kind,
             width_sigma_share: self.width_sigma_share(),
+            uncertainty: self.uncertainty(),
+            height_share: None,
             image_size_px: self.image_size_px(),
+        }
+    }
+
+    /// What is left open in camera and bed plane, if somebody has told it.
+    pub fn uncertainty(&self) -> Option<Uncertainty> {
+        match self {
+            Self::Scale { .. } => None,
+            Self::Full { quality, .. } => quality.and_then(|quality| quality.uncertainty),
         }
     }
 
@@ -94,6 +109,9 @@ impl Calibration {
 pub struct SurfaceMap {
     kind: Kind,
     width_sigma_share: Option<f64>,
+    uncertainty: Option<Uncertainty>,
+    /// What the surface's height leaves open in a width, as a share of it.
+    height_share: Option<f64>,
     image_size_px: Option<[u32; 2]>,
 }
 
@@ -106,7 +124,13 @@ enum Kind {
 impl SurfaceMap {
     /// A surface on which every pixel has the same size.
     pub fn from_scale(mm_per_px: f64) -> Self {
-        Self { kind: Kind::Scale(mm_per_px), width_sigma_share: None, image_size_px: None }
+        Self {
+            kind: Kind::Scale(mm_per_px),
+            width_sigma_share: None,
+            uncertainty: None,
+            height_share: None,
+            image_size_px: None,
+        }
     }
 
     /// Size of the images that it is meant for \[px\]; `None` if it does not
@@ -125,14 +149,45 @@ impl SurfaceMap {
         if of_height <= 0.0 || !of_height.is_finite() {
             return self;
         }
-        let share = self.width_sigma_share.unwrap_or(0.0).hypot(of_height);
-        Self { width_sigma_share: Some(share), ..self }
+        Self { height_share: Some(self.height_share.unwrap_or(0.0).hypot(of_height)), ..self }
     }
 
     /// Relative standard deviation that the calibration behind the map leaves
-    /// in a width, the same error in every width; `None` where it is not known.
+    /// in a width, the same error in every width; `None` where it is not known. The
+    /// largest that a usual bead has where boards were seen:
+    /// [`Self::width_sigma_share_of`] is that of one width.
     pub fn width_sigma_share(&self) -> Option<f64> {
-        self.width_sigma_share
+        self.with_height(self.width_sigma_share)
+    }
+
+    /// The same of the distance between two places that are seen at these pixels, in which
+    /// direction and wherever they are, and beyond where boards were seen, too. That of
+    /// every width where the calibration has no more than one number. `None` also off the
+    /// surface.
+    pub fn width_sigma_share_of(&self, ends: [ImagePoint; 2]) -> Option<f64> {
+        let (Some(uncertainty), Kind::Plane { camera, bed, height_mm }) =
+            (&self.uncertainty, &self.kind)
+        else {
+            return self.width_sigma_share();
+        };
+        let at = |px: ImagePoint| {
+            let mm = self.to_mm(px)?;
+            PositionSlopes::at(camera, bed, Point3::new(mm.x, mm.y, *height_mm))
+        };
+        let [first, last] = ends.map(at);
+        self.with_height(Some(uncertainty.share([&first?, &last?])?))
+    }
+
+    /// What is left open in camera and bed plane behind the map, if it is known.
+    pub fn uncertainty(&self) -> Option<&Uncertainty> {
+        self.uncertainty.as_ref()
+    }
+
+    fn with_height(&self, share: Option<f64>) -> Option<f64> {
+        match (share, self.height_share) {
+            (Some(share), Some(of_height)) => Some(share.hypot(of_height)),
+            (share, of_height) => share.or(of_height),
+        }
     }
 
     /// Where the ray of a pixel meets the surface, in the bed's axes \[mm\].

@@ -5,6 +5,7 @@
 use super::board::Board;
 use super::grey::Grey;
 use crate::geometry::ImagePoint;
+use crate::vision::rank;
 
 /// Difference between squares of both colours from which on a row of squares belongs
 /// to a board, as a share of that between the squares within.
@@ -14,6 +15,10 @@ const CLEARLY: f64 = 2.0;
 /// Scatter of squares of one colour, as a share of the same, from which on they are not
 /// plain.
 const UNEVEN: f64 = 0.15;
+/// Standard deviation within a square, as a share of that difference, up to which it is
+/// one colour: less than that of a square of whose places a third lie on the border to
+/// the next square.
+const PLAIN: f64 = 0.25;
 /// Squares of a row that must lie in the picture for it to tell, if it has as many.
 const FEWEST: usize = 3;
 /// A square's colour is the mean of so many places along each of its sides, well
@@ -66,9 +71,11 @@ pub fn look(board: &Board, grey: &Grey<'_>, corners: &[ImagePoint]) -> Outline {
         let (column, row) = (i % (columns - 1), i / (columns - 1));
         let square =
             [at(column, row), at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)];
-        Some((column + row, colour(grey, square)?))
+        Some((column + row, Shade::of(grey, square)?.mean))
     });
-    let Some((contrast, scatter)) = difference(inner) else { return outline };
+    let Some(Difference { even_less_odd: contrast, scatter }) = Difference::of(inner) else {
+        return outline;
+    };
     outline.is_uneven = scatter > UNEVEN * contrast.abs();
     outline.is_first_bright = contrast > 0.0;
     for side in Side::ALL {
@@ -87,37 +94,95 @@ pub fn look(board: &Board, grey: &Grey<'_>, corners: &[ImagePoint]) -> Outline {
                 [line(0, along), first, second]
             })
             .collect();
-        let alternate = |depth: usize| alternate(grey, &beyond, depth, contrast);
-        if alternate(0) == Some(false) {
+        let row = |depth: usize| Row::of(grey, &beyond, depth);
+        // Columns and rows of the squares beyond, counted on from those within.
+        let first = match side {
+            Side::FirstColumn | Side::FirstRow => 2,
+            Side::LastColumn => columns,
+            Side::LastRow => rows,
+        };
+        if row(0).and_then(|row| row.alternates(contrast)) == Some(false) {
             outline.ends_early.push(side);
-        } else if alternate(1) == Some(true) {
+        } else if row(1).is_some_and(|row| row.continues(first, contrast)) {
             outline.goes_on.push(side);
         }
     }
     outline
 }
 
-/// Whether the squares of a row beyond a side alternate as those within do. `None`
-/// where too few of them lie in the picture.
-fn alternate(
-    grey: &Grey<'_>,
-    beyond: &[[ImagePoint; 3]],
-    depth: usize,
-    contrast: f64,
-) -> Option<bool> {
-    let colours: Vec<(usize, f64)> = beyond
-        .windows(2)
-        .enumerate()
-        .filter_map(|(along, pair)| {
-            let square = [pair[0][depth], pair[0][depth + 1], pair[1][depth], pair[1][depth + 1]];
-            Some((along, colour(grey, square)?))
-        })
-        .collect();
-    if colours.len() < FEWEST.min(beyond.len() - 1) {
-        return None;
+/// The squares of a row beyond a side, as far as they lie in the picture.
+struct Row {
+    /// Each with its number along the side.
+    shades: Vec<(usize, Shade)>,
+}
+
+impl Row {
+    /// The next row to the board, or the one after it. `None` where too few of its squares
+    /// lie in the picture.
+    fn of(grey: &Grey<'_>, beyond: &[[ImagePoint; 3]], depth: usize) -> Option<Self> {
+        let shades: Vec<(usize, Shade)> = beyond
+            .windows(2)
+            .enumerate()
+            .filter_map(|(along, pair)| {
+                let [near, far] = [pair[0], pair[1]];
+                let square = [near[depth], near[depth + 1], far[depth], far[depth + 1]];
+                Some((along, Shade::of(grey, square)?))
+            })
+            .collect();
+        (shades.len() >= FEWEST.min(beyond.len() - 1)).then_some(Self { shades })
     }
-    let (difference, scatter) = difference(colours.into_iter())?;
-    Some(difference.abs() > (GOES_ON * contrast.abs()).max(CLEARLY * scatter))
+
+    /// Whether its squares alternate at all. `None` where all that are seen have one
+    /// colour on a board.
+    fn alternates(&self, contrast: f64) -> Option<bool> {
+        self.difference(0).map(|found| found.is_clear(contrast))
+    }
+
+    /// Whether it is a row of the same board: its squares alternate in step with those
+    /// within, `first` being the number of its first square among them, and most are plain.
+    /// What lies behind a board may be bright and dark in turn, too.
+    fn continues(&self, first: usize, contrast: f64) -> bool {
+        let Some(found) = self.difference(first) else { return false };
+        let mut spreads: Vec<f64> = self.shades.iter().map(|(_, shade)| shade.spread).collect();
+        let is_plain =
+            rank::median(&mut spreads).is_some_and(|spread| spread <= PLAIN * contrast.abs());
+        found.is_clear(contrast) && found.even_less_odd * contrast > 0.0 && is_plain
+    }
+
+    fn difference(&self, first: usize) -> Option<Difference> {
+        Difference::of(self.shades.iter().map(|(along, shade)| (first + along, shade.mean)))
+    }
+}
+
+/// Between the squares of both colours \[grey levels\].
+struct Difference {
+    /// Mean of the even squares less that of the odd ones.
+    even_less_odd: f64,
+    /// Standard deviation of squares of one kind.
+    scatter: f64,
+}
+
+impl Difference {
+    /// Between squares that are given with their numbers; `None` without one of either
+    /// colour.
+    fn of(squares: impl Iterator<Item = (usize, f64)>) -> Option<Self> {
+        let mut sums = [(0.0, 0.0, 0.0); 2];
+        for (number, value) in squares {
+            let (count, sum, square) = &mut sums[number % 2];
+            *count += 1.0;
+            *sum += value;
+            *square += value * value;
+        }
+        let [even, odd] = sums.map(|(count, sum, _)| sum / count);
+        let within = |(count, sum, square): (f64, f64, f64)| square - sum * sum / count;
+        let free = sums[0].0 + sums[1].0 - 2.0;
+        let scatter = ((within(sums[0]) + within(sums[1])).max(0.0) / free.max(1.0)).sqrt();
+        (even - odd).is_finite().then_some(Self { even_less_odd: even - odd, scatter })
+    }
+
+    fn is_clear(&self, contrast: f64) -> bool {
+        self.even_less_odd.abs() > (GOES_ON * contrast.abs()).max(CLEARLY * self.scatter)
+    }
 }
 
 /// The next two corners after three along a line, going outwards; the first two of
@@ -130,33 +195,28 @@ fn beyond([outer, next, third]: [ImagePoint; 3]) -> [ImagePoint; 2] {
     [first, extend(first, outer, next)]
 }
 
-/// Mean grey value well within a square, given row by row; `None` where it leaves the
-/// picture.
-fn colour(grey: &Grey<'_>, square: [ImagePoint; 4]) -> Option<f64> {
-    let [above, below] = [[square[0], square[1]], [square[2], square[3]]];
-    let between = |ends: [ImagePoint; 2], part: f64| ends[0] + (ends[1] - ends[0]) * part;
-    let part = |k: u32| 0.3 + 0.4 * f64::from(k) / f64::from(PLACES - 1);
-    let mut sum = 0.0;
-    for i in 0..PLACES * PLACES {
-        let (right, down) = (part(i % PLACES), part(i / PLACES));
-        sum += grey.at(between([between(above, right), between(below, right)], down))?;
-    }
-    Some(sum / f64::from(PLACES * PLACES))
+/// What a square looks like well within it \[grey levels\].
+struct Shade {
+    mean: f64,
+    /// Standard deviation of its places.
+    spread: f64,
 }
 
-/// Mean of the even squares less that of the odd ones, and the standard deviation of
-/// squares of one kind.
-fn difference(squares: impl Iterator<Item = (usize, f64)>) -> Option<(f64, f64)> {
-    let mut sums = [(0.0, 0.0, 0.0); 2];
-    for (number, value) in squares {
-        let (count, sum, square) = &mut sums[number % 2];
-        *count += 1.0;
-        *sum += value;
-        *square += value * value;
+impl Shade {
+    /// Of a square given row by row; `None` where it leaves the picture.
+    fn of(grey: &Grey<'_>, square: [ImagePoint; 4]) -> Option<Self> {
+        let [above, below] = [[square[0], square[1]], [square[2], square[3]]];
+        let between = |ends: [ImagePoint; 2], part: f64| ends[0] + (ends[1] - ends[0]) * part;
+        let part = |k: u32| 0.3 + 0.4 * f64::from(k) / f64::from(PLACES - 1);
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for i in 0..PLACES * PLACES {
+            let (right, down) = (part(i % PLACES), part(i / PLACES));
+            let value = grey.at(between([between(above, right), between(below, right)], down))?;
+            sum += value;
+            squares += value * value;
+        }
+        let count = f64::from(PLACES * PLACES);
+        let mean = sum / count;
+        Some(Self { mean, spread: (squares / count - mean * mean).max(0.0).sqrt() })
     }
-    let [even, odd] = sums.map(|(count, sum, _)| sum / count);
-    let within = |(count, sum, square): (f64, f64, f64)| square - sum * sum / count;
-    let free = sums[0].0 + sums[1].0 - 2.0;
-    let scatter = ((within(sums[0]) + within(sums[1])).max(0.0) / free.max(1.0)).sqrt();
-    (even - odd).is_finite().then_some((even - odd, scatter))
 }

@@ -160,6 +160,7 @@ mod tests {
             rms_px: 0.2,
             held_out_px: None,
             noise_px: 0.15,
+            design_effect: 1.0,
             trials: vec![],
             views,
         }

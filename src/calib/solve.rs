@@ -8,6 +8,7 @@ use super::choose::{self, Trial};
 use super::equations::{Corner, Elimination, Equations, Factor, Free, Model, Place, SHARED};
 use super::homography;
 use super::lens::Lens;
+use super::pull::{self, Pull};
 use super::sighting::Sighting;
 use crate::geometry::{ImagePoint, Pose};
 
@@ -95,6 +96,9 @@ pub struct Solution {
     /// Standard deviation of a corner's place in one direction \[px\], from what the
     /// fit leaves.
     pub noise_px: f64,
+    /// How many times larger the numbers' variances are than if every corner were off by
+    /// itself; see [`pull::design_effect`].
+    pub design_effect: f64,
     /// All that was tried.
     pub trials: Vec<Trial>,
     /// The pictures, in the order in which they were given.
@@ -234,7 +238,11 @@ impl Views {
             return Err(SolveError::NoFit { rms_px });
         }
         let noise_px = self.noise_variance_px2(fit, free).sqrt();
-        let spreads = self.spreads(fit, free).filter(|_| noise_px.is_finite());
+        let design_effect = Pull::all(self, fit, free)
+            .and_then(|pulls| pull::design_effect(&pulls, free, noise_px * noise_px))
+            .unwrap_or(1.0);
+        let of_numbers_px = noise_px * design_effect.sqrt();
+        let spreads = self.spreads(fit, free).filter(|_| of_numbers_px.is_finite());
         let views: Vec<View> = sightings
             .iter()
             .zip(fit.places.iter().zip(&self.boards))
@@ -243,11 +251,12 @@ impl Views {
         Ok(Solution {
             model: fit.model,
             free,
-            sigma: spreads.map(|spreads| spreads.map(|spread| spread * noise_px)),
+            sigma: spreads.map(|spreads| spreads.map(|spread| spread * of_numbers_px)),
             image_size_px: self.size,
             rms_px,
             held_out_px: trials.iter().find(|t| t.free == free).and_then(|t| t.held_out_px),
             noise_px,
+            design_effect,
             trials,
             views,
         })

@@ -1,5 +1,7 @@
 //! `truebead check`: whether a cell file is sound, and what it suffices for.
 
+mod calibration_map;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -7,6 +9,7 @@ use clap::Args;
 use nalgebra::Point3;
 
 use super::WrongArguments;
+use super::calibrate::check_writable;
 use super::cell::{ExtruderSide, LoadedCell, beyond, steady};
 use crate::calib::Calibration;
 use crate::config::Cell;
@@ -28,14 +31,26 @@ Example:
   truebead check cells/barjuei2022.toml
 
 Every violation is reported at once, with its line. Exit status 2 if there is
-one.")]
+one.
+
+  truebead check my-cell.toml --report calibration.html
+
+draws what the calibration leaves in a width, all over the image, with the gauge
+in it.")]
 pub struct CheckArgs {
     /// Cell file
     cell: PathBuf,
+    /// Page to write: what the calibration leaves in a width, all over the image, with
+    /// the gauge in it
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
 }
 
 /// Runs the command; the findings go to standard output.
 pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
+    if let Some(report) = &args.report {
+        check_writable("report", report)?;
+    }
     let loaded = LoadedCell::read(&args.cell, Purpose::Measure)?;
     check_height(&loaded)?;
     let run = Cell::parse(&args.cell, &loaded.text, Purpose::Run);
@@ -51,6 +66,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
         say!("  images       {width}x{height} px");
     }
     about_surface(&loaded);
+    calibration_map::tell(&loaded, args.report.as_deref())?;
     say!("  suffices for process, render");
     match run {
         Ok(loaded) => {
@@ -125,10 +141,13 @@ fn about_surface(loaded: &LoadedCell) {
         say!(
             "  WARNING      gauge.roi_px reaches beyond where boards were seen, columns {left:.0}"
         );
-        say!(
-            "               to {right:.0} and rows {top:.0} to {bottom:.0}; a width there is known"
-        );
-        say!("               less well than sigma_mm says");
+        let (first, rest) = if quality.uncertainty.is_some() {
+            ("sigma_mm there is", "extrapolated by the model of the lens")
+        } else {
+            ("a width there is known", "less well than sigma_mm says")
+        };
+        say!("               to {right:.0} and rows {top:.0} to {bottom:.0}; {first}");
+        say!("               {rest}");
     }
 }
 

@@ -179,6 +179,7 @@ fn check(args: &ConvertArgs, to: To) -> Result<(), WrongArguments> {
 }
 
 /// What is converted.
+#[expect(clippy::large_enum_variant, reason = "there is one, read once")]
 enum Source {
     /// A calibration of ours: what others can hold of it, and what the pictures said.
     Truebead(Intrinsics, Option<Quality>),
@@ -212,9 +213,17 @@ impl Source {
     /// What a file of this format does not hold, in words; `None` where nothing is lost.
     fn left_out(&self, to: To) -> Option<String> {
         let is_told = |quality: &Quality| {
-            let Quality { reprojection_rms_px: _, width_sigma_share, seen_px, heights_mm } =
-                quality;
-            width_sigma_share.is_some() || seen_px.is_some() || heights_mm.is_some()
+            let Quality {
+                reprojection_rms_px: _,
+                width_sigma_share,
+                seen_px,
+                heights_mm,
+                uncertainty,
+            } = quality;
+            width_sigma_share.is_some()
+                || seen_px.is_some()
+                || heights_mm.is_some()
+                || uncertainty.is_some()
         };
         let mut lost = Vec::new();
         let mut way_back = "";

@@ -1,6 +1,7 @@
 //! `report.html` of a calibration: where boards were seen, what is left between seen
 //! and expected, and what a width is known to, all over the picture.
 
+pub mod cell;
 mod drawing;
 
 use maud::{Markup, html};
@@ -123,7 +124,7 @@ impl Page<'_> {
                         (format!(
                             "Standard deviation of the width of a bead of {} mm [mm] whose middle is \
                              in a cell, the larger one of a bead along the picture and one across it, \
-                             from the noise of the corners. Dashed: where boards were seen; beads that lie in it with both ends count for the number above. Empty \
+                             from the corners. Dashed: where boards were seen; beads that lie in it with both ends count for the number above. Empty \
                              cells do not see such a bead whole. A height that is 1 mm wrong changes \
                              it by {:.4} mm.",
                             map.bead_mm, map.by_a_millimetre_of_height_mm

@@ -9,8 +9,8 @@ use crate::calib::board::{Board, BoardError, all_seen};
 use crate::calib::covariance::Covariance;
 use crate::calib::plane::{OnBed, bed_from_board};
 use crate::calib::sighting::{self, Sighting};
-use crate::calib::solve;
-use crate::calib::{Calibration, Camera};
+use crate::calib::solve::{self, Solution};
+use crate::calib::{Calibration, Camera, Quality};
 use crate::geometry::{ImagePoint, Pose};
 use crate::units::Mm;
 
@@ -21,11 +21,12 @@ const BED_TILT_DEG: f64 = 8.0;
 /// Least distance of a corner from the border of the picture \[px\].
 const BORDER_PX: f64 = 8.0;
 const MOST_TRIES: u64 = 2000;
-/// Beads are this far from the middle of the board on the bed, along its rows and
-/// columns, as parts of its sides.
-const PLACES: [[f64; 2]; 3] = [[0.0, 0.0], [-0.35, -0.3], [0.3, 0.35]];
-/// Widths of the beads as parts of the board's length.
-const WIDTH: f64 = 0.3;
+/// Cells along each side of the board on the bed; the middle of a bead is in the middle of
+/// each.
+const GRID: u32 = 5;
+/// Widths of the beads as parts of the board's length: those of the outer cells end where
+/// the corners do.
+const WIDTH: f64 = 1.0 / 5.0;
 
 /// A camera that is calibrated with boards.
 #[derive(Debug, Clone)]
@@ -144,15 +145,40 @@ impl Bench {
         let on_bed = OnBed::fit(&solution.model, vec![board.place(&sightings.last()?.corners)])?;
         let covariance = Covariance::of(board, &solution, &on_bed, Mm::ZERO)?;
         let heights = [Mm::ZERO, Mm::new(0.05 * self.rig.distance_mm).ok()?];
-        let beads = heights.into_iter().flat_map(|height| PLACES.map(|place| (height, place)));
+        let calibration = self.calibration(&solution, &on_bed, &covariance);
+        let beads = heights.into_iter().flat_map(|height| cells().map(move |at| (height, at)));
         beads
             .enumerate()
-            .map(|(bead, (height, place))| {
-                let (ends, width_mm) = self.bead(poses.last()?, place, height)?;
-                let (found_mm, sigma_mm) = covariance.width_mm(ends, height)?;
+            .map(|(bead, (height, cell))| {
+                let (ends, width_mm) = self.bead(poses.last()?, cell, height)?;
+                let map = calibration.surface(height, None);
+                let found_mm = (map.to_mm(ends[1])? - map.to_mm(ends[0])?).norm();
+                let sigma_mm = map.width_sigma_share_of(ends)? * found_mm;
                 Some(Outcome { bead, error_mm: found_mm - width_mm, sigma_mm, width_mm })
             })
             .collect()
+    }
+
+    /// As a file would hold it.
+    fn calibration(
+        &self,
+        solution: &Solution,
+        on_bed: &OnBed,
+        covariance: &Covariance,
+    ) -> Calibration {
+        Calibration::Full {
+            image_size_px: self.rig.image_size_px,
+            camera: *solution.camera(),
+            bed: on_bed.bed(Mm::ZERO),
+            robot_z: Mm::ZERO,
+            quality: Some(Quality {
+                reprojection_rms_px: solution.rms_px,
+                width_sigma_share: None,
+                seen_px: None,
+                heights_mm: None,
+                uncertainty: Some(covariance.uncertainty()),
+            }),
+        }
     }
 
     /// One at random that shows the whole board.
@@ -183,7 +209,7 @@ impl Bench {
 
     /// Where the true camera sees the ends of a bead on the true bed \[px\], and how
     /// wide it is \[mm\].
-    fn bead(&self, on_bed: &Pose, place: [f64; 2], height: Mm) -> Option<([ImagePoint; 2], f64)> {
+    fn bead(&self, on_bed: &Pose, cell: [f64; 2], height: Mm) -> Option<([ImagePoint; 2], f64)> {
         let rig = &self.rig;
         let calibration = Calibration::Full {
             image_size_px: rig.image_size_px,
@@ -195,12 +221,19 @@ impl Bench {
         let map = calibration.surface(height, None);
         let sides = rig.board.corners_mm().last()?.coords;
         // Y of the bed is the board's turned over.
-        let middle = [(0.5 + place[0]) * sides.x, -(0.5 + place[1]) * sides.y];
+        let middle = [cell[0] * sides.x, -cell[1] * sides.y];
         let half = 0.5 * WIDTH * sides.x;
         let end =
             |by: f64| map.to_px(crate::geometry::SurfacePoint::new(middle[0] + by, middle[1]));
         Some(([end(-half)?, end(half)?], 2.0 * half))
     }
+}
+
+/// Middles of the cells along the rows and columns of the board on the bed, as parts of its
+/// sides.
+fn cells() -> impl Iterator<Item = [f64; 2]> {
+    let part = |i: u32| (f64::from(i) + 0.5) / f64::from(GRID);
+    (0..GRID * GRID).map(move |i| [part(i % GRID), part(i / GRID)])
 }
 
 /// A pose at random, with the board's middle somewhere in the picture.

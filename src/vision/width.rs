@@ -32,7 +32,9 @@ pub struct WidthMeasurement {
 impl WidthMeasurement {
     /// Adds what the calibration leaves open to the picture's own sigma.
     pub(super) fn with_calibration(self, surface: &SurfaceMap) -> Result<Self, Reject> {
-        let Some(share) = surface.width_sigma_share() else { return Ok(self) };
+        let Some(share) = surface.width_sigma_share_of([self.left, self.right]) else {
+            return Ok(self);
+        };
         let variance = self.sigma.get().powi(2) + (share * self.width.get()).powi(2);
         let sigma = Mm::new(variance.sqrt()).map_err(|_| Reject::OffSurface)?;
         Ok(Self { sigma, ..self })

@@ -38,6 +38,7 @@ fn calibration() -> Calibration {
         reprojection_rms_px: 0.1,
         width_sigma_share: Some(1e-3),
         seen_px: None,
+        uncertainty: None,
         heights_mm: None,
     };
     Calibration::Full {

@@ -56,6 +56,62 @@ fn other_boards_are_told_from_none() {
     assert_eq!(none, Refusal::NoBoard { columns: 9, rows: 6 });
 }
 
+/// A board that fills the upper left of a picture to its very edge, what is around it
+/// painted over by what lies at each place, in squares from its first inner corner.
+fn at_the_edge(shown: &Board, behind: impl Fn(f64, f64) -> Option<u8>) -> Frame {
+    let camera =
+        Camera::pinhole([620.0, 622.0], [263.0, 198.0]).with_five([-0.2, 0.05, 0.0, 0.0, 0.0]);
+    let rotation = Pose::new(Vector3::new(0.2, -0.15, 0.05), Vector3::zeros()).rotation();
+    let pose = Pose::from_parts(rotation, Vector3::new(-160.0, -116.0, 420.0));
+    let frame = BoardStudio::new(&camera, [520, 400]).take(shown, &pose, Exposure::SHARP, 3);
+    let frame = frame.unwrap();
+    let (width, _) = frame.size();
+    let mut values = frame.to_grey8().into_owned();
+    for (i, value) in values.iter_mut().enumerate() {
+        let px = Vector2::new(i % width, i / width).map(|at| f64::from(u16::try_from(at).unwrap()));
+        let ray = camera.ray(ImagePoint::from(px)).unwrap();
+        let normal = pose.rotation() * Vector3::z();
+        let ray = Vector3::new(ray.x, ray.y, 1.0);
+        let hit = ray * (normal.dot(&pose.translation_mm()) / normal.dot(&ray));
+        let at = pose.apply_inverse(hit.into()) / 20.0;
+        *value = behind(at.x, at.y).unwrap_or(*value);
+    }
+    Frame::new(0, Stamp::START, frame.size(), Pixels::Grey8(values)).unwrap()
+}
+
+#[test]
+fn a_board_close_to_the_edge_is_found_and_a_larger_one_is_not_taken_for_it() {
+    let found = look(&board(9, 6), "a", &at_the_edge(&board(9, 6), |_, _| None)).unwrap();
+    assert_eq!(found.corners.len(), 54);
+    assert!(found.corners.iter().any(|corner| corner.px.y < 40.0), "{:?}", found.corners);
+    for (columns, rows) in [(10, 6), (9, 7), (10, 7)] {
+        let larger = at_the_edge(&board(columns, rows), |_, _| None);
+        let said = look(&board(9, 6), "a", &larger).unwrap_err();
+        let is_told = matches!(said, Refusal::Larger { .. } | Refusal::OtherBoard { .. });
+        assert!(is_told, "{columns}x{rows}: {said}");
+    }
+}
+
+/// In `right07.jpg` of OpenCV's samples what lies behind is bright and dark in turn where
+/// a further row of squares would be, but out of step with the board, and not plain.
+#[test]
+fn what_lies_behind_a_board_is_not_taken_for_more_of_it() {
+    let beyond = |x: f64, y: f64| (9.0..11.0).contains(&x) && (0.0..5.0).contains(&y);
+    let is_odd = |x: f64, y: f64| ((x.floor() + y.floor()).rem_euclid(2.0) - 1.0).abs() < 0.5;
+    let shade = |is_dark: bool| Some(if is_dark { 60 } else { 190 });
+    let in_step = |x: f64, y: f64| beyond(x, y).then(|| shade(!is_odd(x, y))).flatten();
+    let out_of_step = |x: f64, y: f64| beyond(x, y).then(|| shade(is_odd(x, y))).flatten();
+    let patterned = |x: f64, y: f64| {
+        let part = if is_odd(x, y) { 0.25 } else { 0.75 };
+        beyond(x, y).then(|| shade((8.0 * y).rem_euclid(2.0) < 2.0 * part)).flatten()
+    };
+    let said = look(&board(9, 6), "a", &at_the_edge(&board(9, 6), in_step));
+    let is_larger = matches!(said, Err(Refusal::Larger { .. } | Refusal::OtherBoard { .. }));
+    assert!(is_larger, "{said:?}");
+    assert!(look(&board(9, 6), "a", &at_the_edge(&board(9, 6), out_of_step)).is_ok());
+    assert!(look(&board(9, 6), "a", &at_the_edge(&board(9, 6), patterned)).is_ok());
+}
+
 fn marked(columns: usize, rows: usize, dictionary: Dictionary) -> Board {
     let marks = Marks { side: Mm::constant(14.0), dictionary };
     board(columns, rows).with_marks(marks).unwrap()

@@ -178,6 +178,7 @@ impl<'a> Conclusion<'a> {
                 [from.x, from.y, to.x, to.y].map(|px| (px * 10.0).round() / 10.0)
             }),
             heights_mm: covariance.and_then(|_| solution.heights_mm(self.board, &bed)),
+            uncertainty: covariance.map(Covariance::uncertainty),
         };
         let model = (solution.camera(), &bed);
         file::to_toml(model, solution.image_size_px, plane.robot_z, Some(quality), &[note])

@@ -92,6 +92,9 @@ pub fn lens(solution: &Solution) -> String {
     out
 }
 
+/// Design effect from which on it is no chance: its own standard error is some 0.16 with a
+/// dozen pictures.
+const TOLD_EFFECT: f64 = 1.5;
 /// Letters of the longest name of a number.
 const NAME: usize = 18;
 
@@ -115,6 +118,18 @@ pub fn camera(solution: &Solution) -> String {
         line!(out, "  {name:NAME$}  {value:10.digits$} ± {sigma}{unit}");
     }
     line!(out, "  noise of a corner: {:.3} px", solution.noise_px);
+    if solution.design_effect > TOLD_EFFECT {
+        line!(
+            out,
+            "  the pictures contradict each other more than such noise explains (a board that is"
+        );
+        line!(
+            out,
+            "  not flat, a lens that no model describes): all standard deviations are {:.1} times",
+            solution.design_effect.sqrt()
+        );
+        line!(out, "  as large as that of independent corners");
+    }
     out
 }
 
@@ -188,7 +203,8 @@ pub fn width(
         |map| format!(" ({:.4} mm in {} mm)", share * map.bead_mm, map.bead_mm),
     );
     line!(out, "\na width is known to {:.3} %{bead} where boards were seen,", 100.0 * share);
-    line!(out, "  as far as the corners' noise tells; sigma_mm of each width contains it");
+    line!(out, "  as far as the corners tell; sigma_mm of each width contains what is left open");
+    line!(out, "  at its own place, which `truebead check` draws with the gauge");
     let [from, to] = covariance.seen_px();
     line!(
         out,

@@ -38,8 +38,13 @@ pub fn text(
         ));
     }
     let reprojection_rms_px = plane.on_bed.rms_px;
-    let quality =
-        Quality { reprojection_rms_px, width_sigma_share: None, seen_px: None, heights_mm: None };
+    let quality = Quality {
+        reprojection_rms_px,
+        width_sigma_share: None,
+        seen_px: None,
+        heights_mm: None,
+        uncertainty: None,
+    };
     if reprojection_rms_px > DOUBTED_PX {
         notes.push(format!(
             "corners are {reprojection_rms_px:.2} px off, a sharp picture of a flat board and a \

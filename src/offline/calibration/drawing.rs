@@ -3,8 +3,9 @@
 use maud::{Markup, html};
 
 use crate::calib::map::{CELLS, WidthMap};
+use crate::calib::share_map::ShareMap;
 use crate::calib::solve::{Solution, View};
-use crate::offline::report::palette::{GAUGE, Ink, LEFT_EDGE, REJECTED, WIDTH};
+use crate::offline::report::palette::{GAUGE, Ink, LEFT_EDGE, LIMIT, REJECTED, WIDTH};
 use crate::vision::rank;
 
 /// Width of a drawing on the page [units of its own].
@@ -23,8 +24,8 @@ pub struct Drawing {
 }
 
 impl Drawing {
-    fn of(solution: &Solution) -> Self {
-        let size_px = solution.image_size_px.map(f64::from);
+    fn of(image_size_px: [u32; 2]) -> Self {
+        let size_px = image_size_px.map(f64::from);
         Self { size_px, scale: (WIDE - ROOM.0 - 8.0) / size_px[0] }
     }
 
@@ -109,7 +110,7 @@ fn typical_side(solution: &Solution) -> f64 {
 
 /// Every corner with its way from where it is expected.
 pub fn residuals(solution: &Solution, times: f64) -> Markup {
-    let drawing = Drawing::of(solution);
+    let drawing = Drawing::of(solution.image_size_px);
     let corners =
         || solution.views.iter().flat_map(|view| view.corners.iter().zip(&view.errors_px));
     drawing.svg(
@@ -129,39 +130,75 @@ pub fn residuals(solution: &Solution, times: f64) -> Markup {
 
 /// What a width is known to, cell by cell, with where boards were seen.
 pub fn width_map(solution: &Solution, map: &WidthMap) -> Markup {
-    let drawing = Drawing::of(solution);
+    let drawing = Drawing::of(solution.image_size_px);
     let [width, height] = drawing.size_px;
     let (columns, rows) = CELLS;
-    let (low, high) = map.range_mm().unwrap_or((1.0, 1.0));
     let edge = |at: u32, count: u32, side: f64| f64::from(at) / f64::from(count) * side - 0.5;
-    let shade =
-        |sigma: f64| 0.06 + 0.74 * ((sigma / low).ln() / (high / low).ln().max(1e-9)).min(1.0);
-    let cells = || map.cells.iter().zip(0_u32..).filter_map(|(cell, i)| Some(((*cell)?, i)));
+    let area = |i: u32| {
+        let (column, row) = (i % columns, i / columns);
+        let [left, right] = [column, column + 1].map(|at| edge(at, columns, width));
+        let [top, bottom] = [row, row + 1].map(|at| edge(at, rows, height));
+        [left, top, right, bottom]
+    };
     drawing.svg(
         "standard deviation of a width over the picture",
         &html! {
-            @for (sigma, i) in cells() {
-                @let (column, row) = (i % columns, i / columns);
-                @let (x, y) = (drawing.x(edge(column, columns, width)), drawing.y(edge(row, rows, height)));
-                @let right = drawing.x(edge(column + 1, columns, width));
-                @let bottom = drawing.y(edge(row + 1, rows, height));
-                rect x=(x) y=(y) width=(round(right - x)) height=(round(bottom - y))
-                    fill=(WIDTH.css()) opacity=(format!("{:.2}", shade(sigma))) {}
-                text.label x=(round(f64::midpoint(x, right))) y=(round(f64::midpoint(y, bottom)) + 4.0)
-                    text-anchor="middle" style="font-size:11.5px;font-weight:400" { (short(sigma)) }
+            (drawing.cells(&map.cells, map.range_mm(), area, short))
+            @if let Some([from, to]) = solution.seen_px() {
+                (drawing.frame([from.x, from.y, to.x, to.y], GAUGE, true))
             }
-            (seen(drawing, solution, GAUGE))
         },
     )
 }
 
-/// The part of the picture in which boards were seen.
-fn seen(drawing: Drawing, solution: &Solution, ink: Ink) -> Markup {
-    let Some([from, to]) = solution.seen_px() else { return html! {} };
-    let (left, top) = (drawing.x(from.x), drawing.y(from.y));
-    html! {
-        rect x=(left) y=(top) width=(round(drawing.x(to.x) - left)) height=(round(drawing.y(to.y) - top))
-            fill="none" stroke=(ink.css()) stroke-width="1.6" stroke-dasharray="7 4" {}
+/// What a width is known to, cell by cell, with the gauge and where boards were seen.
+pub fn share_map(map: &ShareMap, gauge_px: [f64; 4], seen_px: Option<[f64; 4]>) -> Markup {
+    let drawing = Drawing::of(map.image_size_px);
+    drawing.svg(
+        "relative standard deviation of a width over the image, with the gauge",
+        &html! {
+            (drawing.cells(&map.cells, map.range(), |i| map.cell_px(i), |share| short(100.0 * share)))
+            @if let Some(seen) = seen_px { (drawing.frame(seen, LIMIT, true)) }
+            (drawing.frame(gauge_px, GAUGE, false))
+        },
+    )
+}
+
+impl Drawing {
+    /// Cells that are the darker the more they hold, each with its value.
+    fn cells(
+        self,
+        cells: &[Option<f64>],
+        range: Option<(f64, f64)>,
+        area_px: impl Fn(u32) -> [f64; 4],
+        words: impl Fn(f64) -> String,
+    ) -> Markup {
+        let (low, high) = range.unwrap_or((1.0, 1.0));
+        let shade =
+            |sigma: f64| 0.06 + 0.74 * ((sigma / low).ln() / (high / low).ln().max(1e-9)).min(1.0);
+        let filled = || cells.iter().zip(0_u32..).filter_map(|(cell, i)| Some(((*cell)?, i)));
+        html! {
+            @for (sigma, i) in filled() {
+                @let [left, top, right, bottom] = area_px(i);
+                @let (x, y) = (self.x(left), self.y(top));
+                @let (right, bottom) = (self.x(right), self.y(bottom));
+                rect x=(x) y=(y) width=(round(right - x)) height=(round(bottom - y))
+                    fill=(WIDTH.css()) opacity=(format!("{:.2}", shade(sigma))) {}
+                text.label x=(round(f64::midpoint(x, right))) y=(round(f64::midpoint(y, bottom)) + 4.0)
+                    text-anchor="middle" style="font-size:11.5px;font-weight:400" { (words(sigma)) }
+            }
+        }
+    }
+
+    /// A part of the image: first column and row, last column and row \[px\].
+    fn frame(self, [left, top, right, bottom]: [f64; 4], ink: Ink, is_dashed: bool) -> Markup {
+        let (x, y) = (self.x(left), self.y(top));
+        let (width, height) = (round(self.x(right) - x), round(self.y(bottom) - y));
+        let dashes = if is_dashed { "7 4" } else { "none" };
+        html! {
+            rect x=(x) y=(y) width=(width) height=(height)
+                fill="none" stroke=(ink.css()) stroke-width="1.6" stroke-dasharray=(dashes) {}
+        }
     }
 }
 

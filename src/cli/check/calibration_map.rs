@@ -1,0 +1,129 @@
+//! What the calibration leaves in a width, all over the image, with the gauge in it: as
+//! text, and as a page.
+
+use std::path::Path;
+
+use nalgebra::Vector2;
+
+use crate::calib::Calibration;
+use crate::calib::map::CELLS;
+use crate::calib::share_map::{Bead, ShareMap, share_at};
+use crate::cli::cell::LoadedCell;
+use crate::geometry::{ImagePoint, Roi};
+use crate::io::whole_file::write_whole;
+use crate::offline::calibration::cell::CellPage;
+use crate::vision::gauge::Axis;
+
+/// Cells of the map in text, along the image and across it.
+const TEXT_CELLS: (u32, u32) = (8, 6);
+
+/// Prints it, and writes the page where one is asked for. Says so where the calibration
+/// has no more than one number for the whole image, or none.
+pub fn tell(loaded: &LoadedCell, page: Option<&Path>) -> anyhow::Result<()> {
+    let Calibration::Full { quality, .. } = &loaded.calibration else {
+        anyhow::ensure!(page.is_none(), "--report: mm_per_px has no map of its uncertainty");
+        return Ok(());
+    };
+    let surface = loaded.surface(None);
+    let bead = bead(loaded);
+    let Some(text) = ShareMap::of(&surface, &bead, TEXT_CELLS) else {
+        if let Some(share) = surface.width_sigma_share() {
+            let percent = 100.0 * share;
+            say!("  sigma        the calibration leaves {percent:.3} % of every width open: one");
+            say!("               number for the whole image; `calibrate` anew makes a map");
+        } else {
+            say!("  sigma        what the calibration leaves in a width is not known");
+        }
+        anyhow::ensure!(page.is_none(), "--report: the calibration file has no [uncertainty]");
+        return Ok(());
+    };
+    let roi = loaded.cell.gauge.roi;
+    let in_gauge = share_at(&surface, &bead, middle(roi));
+    say!(
+        "  sigma        what the calibration leaves in a width of {:.1} mm [% of it], where its",
+        { bead.width_mm }
+    );
+    say!("               middle is seen; [ ] in the gauge, - not seen whole");
+    for line in lines(&text, roi) {
+        say!("               {line}");
+    }
+    if let Some(share) = in_gauge {
+        say!(
+            "               {:.3} % or {:.4} mm in the middle of the gauge",
+            100.0 * share,
+            share * bead.width_mm
+        );
+    }
+    let Some(path) = page else { return Ok(()) };
+    let Some(map) = ShareMap::of(&surface, &bead, CELLS) else { return Ok(()) };
+    let page = CellPage {
+        cell: &loaded.path.display().to_string(),
+        calibration: &loaded.calibration_words(),
+        map: &map,
+        gauge: roi,
+        in_gauge,
+        seen_px: quality.and_then(|quality| quality.seen_px),
+    };
+    write_whole(path, page.page().as_bytes())?;
+    say!("  wrote        {}", path.display());
+    Ok(())
+}
+
+/// One of a plausible width that runs as the gauge says: the geometric mean of the
+/// narrowest and the widest.
+fn bead(loaded: &LoadedCell) -> Bead {
+    let gauge = &loaded.cell.gauge;
+    let (narrowest, widest) = gauge.width_range;
+    let across = match gauge.axis {
+        Axis::Vertical => Vector2::x(),
+        Axis::Horizontal => Vector2::y(),
+    };
+    Bead { width_mm: (narrowest.get() * widest.get()).sqrt(), across }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "pixels of an image")]
+fn middle(roi: Roi) -> ImagePoint {
+    let half = |from: usize, length: usize| from as f64 + (length as f64 - 1.0) / 2.0;
+    ImagePoint::new(half(roi.x, roi.width), half(roi.y, roi.height))
+}
+
+/// The map with the columns and rows of the cells' middles \[px\].
+fn lines(map: &ShareMap, gauge: Roi) -> Vec<String> {
+    let (columns, rows) = map.counts;
+    let middle = |cell: u32| {
+        let [left, top, right, bottom] = map.cell_px(cell);
+        (f64::midpoint(left, right), f64::midpoint(top, bottom))
+    };
+    let heads: Vec<String> =
+        (0..columns).map(|column| format!("{:>8.0}", middle(column).0)).collect();
+    let mut lines = vec![format!("{:>6}{}", "px", heads.concat())];
+    for row in 0..rows {
+        let cells: String = (0..columns)
+            .map(|column| {
+                let cell = row * columns + column;
+                let share = map.cells.get(cell as usize).copied().flatten();
+                let words = share.map_or_else(|| "-".to_owned(), percent);
+                if map.is_in(gauge, cell) {
+                    format!(" [{words:>5}]")
+                } else {
+                    format!("{words:>7} ")
+                }
+            })
+            .collect();
+        lines.push(format!("{:>6.0}{}", middle(row * columns).1, cells.trim_end()));
+    }
+    lines
+}
+
+/// Three digits, if they count.
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    let places = if percent < 1.0 {
+        3
+    } else if percent < 10.0 {
+        2
+    } else {
+        1
+    };
+    format!("{percent:.places$}")
+}
