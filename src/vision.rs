@@ -49,6 +49,7 @@ mod edge_lines;
 mod fit;
 mod gamma;
 pub mod gauge;
+mod ground;
 mod line;
 mod measure;
 mod noise;

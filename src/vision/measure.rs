@@ -1,6 +1,7 @@
 //! One frame after the other: bands, candidates, contours, sub-pixel edges,
 //! width.
 
+mod even;
 mod judge;
 mod locate;
 mod rough;
@@ -19,6 +20,7 @@ use super::contour::Contours;
 use super::edge::Candidates;
 use super::edge_lines;
 use super::gauge::{Gauge, Method};
+use super::ground::{Ground, Place};
 use super::noise;
 use super::parallel::Parallel;
 use super::pool::{self, Bands};
@@ -67,9 +69,13 @@ struct Work {
     right: Tracer,
     least_off_px: f64,
     is_lost: bool,
+    /// Whether edges were located line by line.
+    is_refined: bool,
     contrasts: [f64; 2],
     scatter: Vec<f64>,
     middles: Vec<f64>,
+    places: Vec<Place>,
+    ground: Ground,
     axis: axis::Memory,
     left_px: Vec<ImagePoint>,
     right_px: Vec<ImagePoint>,
@@ -100,9 +106,12 @@ impl Measurer {
             right: Tracer::default(),
             least_off_px: OFF_PX,
             is_lost: false,
+            is_refined: false,
             contrasts: [0.0; 2],
             scatter: Vec::new(),
             middles: Vec::new(),
+            places: Vec::new(),
+            ground: Ground::default(),
             axis: axis::Memory::default(),
             left_px: Vec::new(),
             right_px: Vec::new(),
@@ -226,6 +235,12 @@ impl Work {
             Err(reject) if may_be_rough(&reject) => {
                 self.measure_rough(strip, range, view, surface).map_err(|rough| rough.or(reject))
             }
+            Ok(found) if self.may_be_more_than_steps() => match self.find_rough(strip, range) {
+                Ok(fits) if self.explains_more(&fits) => {
+                    self.take_rough(&fits, strip, view, surface)
+                }
+                _ => Ok(found),
+            },
             found => found,
         }
     }
@@ -244,6 +259,8 @@ impl Work {
         self.trace(strip, pair)?;
         self.sort_out(pair.bright)?;
         self.check_contrast()?;
+        self.check_blur()?;
+        self.check_ground(strip)?;
         self.check_border(strip.across)?;
         self.width_on(view, surface)
     }
@@ -266,7 +283,7 @@ impl Work {
         }
         let sides = [&self.left, &self.right].map(|tracer| axis::Side {
             places: tracer.edges(),
-            common_variance: tracer.common_variance,
+            common_variance: tracer.common_variance + tracer.ground_variance,
             misfit: tracer.misfit,
             mean_variance: tracer.mean_variance,
         });

@@ -84,6 +84,27 @@ pub enum Reject {
         /// `max_sigma`.
         max_sigma: f64,
     },
+    /// Edges that are blurred over so wide a flank that its shape matters.
+    Blurred {
+        /// Standard deviation of the blur \[px\].
+        got_px: f64,
+        /// Largest that is measured \[px\].
+        limit_px: f64,
+    },
+    /// A pattern beside the bead that is as strong as an edge.
+    Patterned {
+        /// Standard deviation of the pattern, as a share of the contrast.
+        got: f64,
+        /// Largest that is measured.
+        limit: f64,
+    },
+    /// A bead that is not equally bright beside both edges and in its middle.
+    Uneven {
+        /// Difference of brightness, as a share of the fainter edge's contrast.
+        got: f64,
+        /// Largest that is measured.
+        limit: f64,
+    },
     /// Edges that hardly stand out from the bead's texture.
     Vague {
         /// Strength of the weaker edge, in typical steps of the texture.
@@ -145,6 +166,9 @@ impl Reject {
             Self::Scattered { .. }
             | Self::Occluded { .. }
             | Self::Unsure { .. }
+            | Self::Blurred { .. }
+            | Self::Patterned { .. }
+            | Self::Uneven { .. }
             | Self::Vague { .. } => "unsure",
             Self::Ambiguous { .. } => "ambiguous",
             Self::Clipped { .. } => "clipped",
@@ -218,6 +242,22 @@ impl fmt::Display for Reject {
                     100.0 * max_sigma,
                 )
             }
+            Self::Blurred { got_px, limit_px } => write!(
+                f,
+                "an edge is blurred by {got_px:.1} px, measured are up to {limit_px:.1}; the lens may be out of focus, or the bead moves sideways while the shutter is open: a shorter exposure helps"
+            ),
+            Self::Patterned { got, limit } => write!(
+                f,
+                "the ground beside the bead varies by {:.0} % of the contrast, {:.0} % is bearable; a plainer ground or light that makes the bead brighter helps",
+                100.0 * got,
+                100.0 * limit
+            ),
+            Self::Uneven { got, limit } => write!(
+                f,
+                "what lies between the edges differs in brightness by {:.0} % of an edge's contrast, {:.0} % is bearable: one of the edges may not be the bead's; light from both sides, or a width range that is nearer to the bead, helps",
+                100.0 * got,
+                100.0 * limit
+            ),
             Self::Vague { got, need } => write!(
                 f,
                 "the fainter edge stands out {got:.1} times from the bead's texture, {need:.1} are needed; light that makes both edges clear, or a longer gauge along the bead, helps"

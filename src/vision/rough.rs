@@ -23,7 +23,7 @@ use super::coarse::StepLine;
 use super::number::{float, narrow};
 use super::strip::{Grey, Strip};
 use super::trace::Located;
-use levels::{Crossings, Levels};
+use levels::{Crossings, Levels, MeanProfile};
 use route::Route;
 use window::Windows;
 
@@ -71,6 +71,15 @@ pub struct RoughFit {
     pub contrast: f64,
     /// Standard deviation of the Gaussian that has the flank's slope \[px\].
     pub blur_px: f64,
+    /// Level of the bead beside the edge \[grey levels\], dark beads inverted.
+    pub bead_grey: f64,
+    /// Whether a groove lies outside.
+    pub is_groove: bool,
+    /// Whether what lies outside is as wide as ground.
+    pub is_on_ground: bool,
+    /// Share of the pixels about the edge that show neither the bead nor what lies
+    /// outside.
+    pub odd_share: f64,
 }
 
 impl RoughEdge {
@@ -97,6 +106,10 @@ impl RoughEdge {
             rows_fraction: float(seen) / float(self.crossings.at.len()),
             contrast: self.levels.contrast(),
             blur_px: noise.blur_px,
+            bead_grey: self.levels.mean().map_or(0.0, MeanProfile::bead),
+            is_groove: self.levels.mean().is_some_and(MeanProfile::is_groove),
+            is_on_ground: self.levels.mean().is_some_and(|mean| mean.on_ground),
+            odd_share: noise::mean_of(&self.crossings.odd),
         })
     }
 

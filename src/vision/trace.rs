@@ -141,12 +141,16 @@ pub struct Tracer {
     together: f64,
     /// Blur of the edge \[px\].
     pub blur_px: f64,
+    /// Whether ground lies beside it, no groove.
+    pub is_on_ground: bool,
     /// Variance of the whole edge's position that all places share, from
     /// shading that is not known better \[px²\].
     pub common_variance: f64,
     /// Variance of the mean position, where it is known apart from that of the
     /// places \[px²\].
     pub mean_variance: Option<f64>,
+    /// Variance of the whole edge's position from the pattern beside the bead \[px²\].
+    pub ground_variance: f64,
 }
 
 impl Tracer {
@@ -158,6 +162,7 @@ impl Tracer {
         (self.common_variance, self.mean_variance) = (0.0, Some(fit.variance));
         self.misfit = f64::INFINITY;
         self.state = State::Open;
+        self.is_on_ground = fit.is_on_ground && !fit.is_groove;
     }
 
     /// The edges of the last frame, band by band.
@@ -221,6 +226,7 @@ impl Tracer {
     ) -> Option<(f64, f64)> {
         self.edges.clear();
         self.mean_variance = None;
+        self.is_on_ground = true;
         self.seen = None;
         self.path.clear();
         self.state = State::Unseen;

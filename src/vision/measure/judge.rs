@@ -2,10 +2,12 @@
 //! and steps that are too low.
 
 use super::Work;
+use crate::vision::ground::{Place, Side};
 use crate::vision::number::float;
 use crate::vision::outlier;
 use crate::vision::rank;
 use crate::vision::reject::Reject;
+use crate::vision::strip::{Grey, Strip};
 use crate::vision::trace::Tracer;
 use crate::vision::width::WidthMeasurement;
 
@@ -42,6 +44,19 @@ const WHOLE_SCATTER_PX: f64 = 4.0;
 const WHOLE_SHARE: f64 = 0.95;
 /// The same where one edge was hidden and had to be located line by line.
 const LOST_SCATTER_PX: f64 = 0.5;
+
+/// Strongest pattern beside the bead, as a share of the contrast: a pattern of a third
+/// is measured, of a stronger one parts are taken for the bead.
+const STRONGEST_PATTERN: f64 = 0.37;
+/// Share of a pattern beside an edge that counts for its place: at the edge it is half
+/// covered by the bead.
+const PATTERN_SHARE: f64 = 0.5;
+/// √(2π): the slope of a Gaussian flank is its height over that and its blur.
+const ROOT_TWO_PI: f64 = 2.506_628_274_631_000_5;
+/// Widest blur of an edge that is measured \[px\]: rendered motion, a box of 20.8 px,
+/// is measured without fault up to 7.4 px of blur, and was off by some pixels from
+/// 7.5 px on.
+const WIDEST_BLUR_PX: f64 = 7.4;
 
 impl Work {
     /// Whether one edge alone is hidden: then it is covered, not of another kind
@@ -93,6 +108,44 @@ impl Work {
                 (*left, *right) = (None, None);
             }
         }
+    }
+
+    /// Refuses edges whose flanks are wider than a lens's blur: a shutter that is open
+    /// while the bead moves leaves another shape, and with it another width.
+    pub(super) fn check_blur(&self) -> Result<(), Reject> {
+        let got_px = self.left.blur_px.max(self.right.blur_px);
+        let is_wide = got_px > WIDEST_BLUR_PX;
+        if is_wide { Err(Reject::Blurred { got_px, limit_px: WIDEST_BLUR_PX }) } else { Ok(()) }
+    }
+
+    /// Looks at the pattern beside the bead: adds to the edges' variance what it may
+    /// move them by, and refuses one that is as strong as an edge.
+    pub(super) fn check_ground<T: Grey>(&mut self, strip: &Strip<'_, T>) -> Result<(), Reject> {
+        let noise = f64::from(self.noise);
+        let mut got: f64 = 0.0;
+        let sides = [(&mut self.left, -1.0), (&mut self.right, 1.0)];
+        for ((tracer, outwards), contrast) in sides.into_iter().zip(self.contrasts) {
+            tracer.ground_variance = 0.0;
+            if !tracer.is_on_ground {
+                continue;
+            }
+            self.places.clear();
+            self.places.extend(tracer.edges().iter().zip(&self.lines).filter_map(
+                |(edge, line)| {
+                    Some(Place { row: usize::midpoint(line.0, line.1 - 1), at: edge.as_ref()?.at })
+                },
+            ));
+            let side = Side { places: &self.places, outwards, blur_px: tracer.blur_px };
+            let Some(pattern) = self.ground.pattern(strip, &side, noise) else { continue };
+            got = got.max(pattern.size_grey / contrast);
+            // Rough edges know what the ground beside them leaves open.
+            if tracer.mean_variance.is_none() {
+                let px_per_grey = PATTERN_SHARE * ROOT_TWO_PI * tracer.blur_px / contrast;
+                tracer.ground_variance = pattern.mean_variance * px_per_grey * px_per_grey;
+            }
+        }
+        let limit = STRONGEST_PATTERN;
+        if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
     /// Scatter of an edge from which on it is noise \[px\].

@@ -43,7 +43,7 @@ impl Work {
         let right_scene = Scene { bead_after: false, ..scene };
         let scenes = [scene, right_scene];
         let mut seen = [None; 2];
-        self.is_lost = false;
+        (self.is_lost, self.is_refined) = (false, false);
         // A loop, so that what is inlined into it is compiled once for both.
         let sides = [(&mut self.left, lefts), (&mut self.right, rights)];
         for ((tracer, rough), (scene, seen)) in sides.into_iter().zip(scenes.iter().zip(&mut seen))
@@ -79,7 +79,7 @@ impl Work {
                 return Ok(());
             }
         }
-        self.least_off_px = LINE_OFF_PX;
+        (self.least_off_px, self.is_refined) = (LINE_OFF_PX, true);
         let left = self.left.refine(&self.table, &scene);
         let right = self.right.refine(&self.table, &right_scene);
         if left && right { Ok(()) } else { Err(failed) }

@@ -12,6 +12,8 @@ const DEEPEST_PX: f32 = 25.0;
 /// Bead in a pixel, as a fraction, beyond which it is a spark or a shadow and counts
 /// for no more. Wide, so that noise is cut off on neither side.
 const FRACTIONS: (f32, f32) = (-1.0, 2.0);
+/// Fractions beyond which a pixel shows something else than the two.
+const ODD: (f32, f32) = (-0.35, 1.35);
 /// Fraction of the bead that a pixel inside the edge must show.
 const BEAD: f32 = 0.5;
 /// The length of a Gaussian flank from a fifth to four fifths of its height,
@@ -25,6 +27,9 @@ pub struct Crossing {
     pub at: f32,
     /// Length of the flank \[px\], from a fifth to four fifths of its height.
     pub flank: f32,
+    /// Share of the pixels that are clearly darker than what lies outside or brighter
+    /// than the bead: of something else.
+    pub odd: f32,
 }
 
 /// Levels about a row.
@@ -57,14 +62,16 @@ pub fn of(row: &Row, flank: &Flank) -> Option<Crossing> {
             return None;
         }
     }
-    let (mut sum, mut mixed) = (0.0, 0.0);
+    let (mut sum, mut mixed, mut odd) = (0.0, 0.0, 0.0);
     for value in &row[first..=last] {
         let fraction = (value - flank.outside) * scale;
         let shown = fraction.clamp(0.0, 1.0);
         sum += fraction.clamp(FRACTIONS.0, FRACTIONS.1);
         mixed += shown * (1.0 - shown);
+        odd += f32::from(u8::from(fraction < ODD.0 || fraction > ODD.1));
     }
-    Some(Crossing { at: single(last) + 0.5 - sum, flank: FLANK * mixed })
+    let odd = odd / single(last + 1 - first);
+    Some(Crossing { at: single(last) + 0.5 - sum, flank: FLANK * mixed, odd })
 }
 
 #[cfg(test)]

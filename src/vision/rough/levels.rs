@@ -28,8 +28,22 @@ const OUTSIDE_ROWS: f64 = 6.0;
 const SAME: f32 = 0.1;
 /// As many such places in a row are ground; fewer are a groove.
 const GROUND_PX: usize = 8;
+/// Blocks whose mean is one look at how much darker a groove is than what lies beyond
+/// it, and how many standard errors darker it must be where it is shallow and where it
+/// is deep: a pattern of the ground has some ten places, one of which is three darker by
+/// chance.
+const LOOK_BLOCKS: usize = 4;
+const DARKER_SIGMAS: (f32, f32) = (4.0, 2.5);
+/// Difference that makes it deep, as a fraction of the step to the bead.
+const DEEP: f32 = 0.4;
+/// Distance from the darkest place from which on what lies beyond is told \[px\].
+const BEYOND_PX: usize = 6;
+/// Ground beside the edge whose mean is its level, where it has a pattern \[px\].
+const NEAR_PX: usize = 16;
 /// Places of the ground that the flank may reach into.
 const FLANK_FOOT_PX: usize = 3;
+/// Height of a groove's far side, as a fraction of the near one.
+const GROOVE_FAR_SIDE: f32 = 0.3;
 /// Depth of a groove as a fraction of the bead's level: hardly any light comes out
 /// of it. A narrow one seems less deep than it is, for the camera's blur fills it.
 const GROOVE_DEPTH: f32 = 0.87;
@@ -40,6 +54,10 @@ pub const DEPTH_SIGMA: f64 = 0.08;
 /// which it certainly is filled by blur, and from which on it certainly is not: a
 /// box of four and five times the blur's standard deviation (0.87 and 1.01).
 const FILLED: (f32, f32) = (0.87, 1.0);
+/// Height of a groove's far side, as a fraction of the near one, from which on its depth
+/// may be hidden, and at which it certainly may: beside plain ground a darker line is
+/// shade, or a lens's or a compression's.
+const ENCLOSED: (f32, f32) = (0.4, 0.6);
 
 /// The mean profile across an edge, from [`OUTSIDE`] pixels before it on.
 pub type Profile = [f32; LENGTH];
@@ -64,6 +82,8 @@ pub struct Crossings {
     pub flank: Vec<f32>,
     /// Distance of the edge from where what lies outside ends, likewise.
     pub gap: Vec<f32>,
+    /// Share of odd pixels, likewise.
+    pub odd: Vec<f32>,
 }
 
 /// Levels about one block of rows.
@@ -91,6 +111,28 @@ pub struct MeanProfile {
 }
 
 impl MeanProfile {
+    /// Whether what lies outside becomes clearly brighter again farther out.
+    pub fn is_groove(&self) -> bool {
+        let bead = mean_of(&self.grey, self.inside);
+        let darkest = self.grey[darkest_of(&self.grey, 0)];
+        let beyond = self.grey[..self.outside.0].iter().fold(darkest, |most: f32, &v| most.max(v));
+        beyond - darkest > GROOVE_FAR_SIDE * (bead - darkest)
+    }
+
+    /// Level of the bead beside the edge \[grey levels\].
+    pub fn bead(&self) -> f64 {
+        f64::from(mean_of(&self.grey, self.inside))
+    }
+
+    /// Standard deviation of the ground's level from place to place \[grey levels\].
+    pub fn ground_spread(&self) -> f64 {
+        let (from, to) = self.ground();
+        let places = &self.grey[from..to.max(from + 1)];
+        let mean = mean_of(&self.grey, (from, to.max(from + 1)));
+        let squares: f32 = places.iter().map(|grey| (grey - mean).powi(2)).sum();
+        f64::from(squares / single(places.len())).sqrt()
+    }
+
     /// Places whose mean is the level of the ground: without those where the flank
     /// begins.
     pub fn ground(&self) -> (usize, usize) {
@@ -175,6 +217,7 @@ impl Levels {
         out.at.clear();
         out.flank.clear();
         out.gap.clear();
+        out.odd.clear();
         let ground =
             self.mean.filter(|mean| mean.on_ground).map(|mean| mean.outside.1 - GROUND_PX / 2);
         for (number, (row, &at)) in windows.all().iter().zip(course).enumerate() {
@@ -189,6 +232,7 @@ impl Levels {
             let found = crossing::of(row, &flank);
             out.at.push(found.map_or(f32::NAN, |found| found.at));
             out.flank.push(found.map_or(f32::NAN, |found| found.flank));
+            out.odd.push(found.map_or(f32::NAN, |found| found.odd));
             out.gap.push(found.map_or(f32::NAN, |found| found.at - flank.start));
         }
     }
@@ -237,9 +281,52 @@ fn mean_profile(blocks: &[Profile], width_px: f32) -> Option<MeanProfile> {
     while outside.1 < OUTSIDE && grey[outside.1] < limit {
         outside.1 += 1;
     }
+    if !is_darker(blocks, darkest, bead - grey[darkest]) {
+        outside = plain(&grey, bead);
+    }
     let on_ground = outside.1 - outside.0 >= GROUND_PX;
-    let filled = if on_ground { 0.0 } else { filled(&grey, outside, bead) };
+    let beyond = grey[..outside.0].iter().fold(grey[darkest], |most: f32, &v| most.max(v));
+    let far_side = (beyond - grey[darkest]) / (bead - grey[darkest]);
+    let enclosed = ((far_side - ENCLOSED.0) / (ENCLOSED.1 - ENCLOSED.0)).clamp(0.0, 1.0);
+    let filled = if on_ground { 0.0 } else { enclosed * filled(&grey, outside, bead) };
     (bead > grey[darkest]).then_some(MeanProfile { grey, inside, outside, on_ground, filled })
+}
+
+/// Whether a place is darker than what lies beyond it along the whole edge, and not only
+/// by the ground's pattern.
+fn is_darker(blocks: &[Profile], darkest: usize, step: f32) -> bool {
+    if darkest < BEYOND_PX + 3 {
+        return false;
+    }
+    let before = (0, darkest.saturating_sub(BEYOND_PX));
+    let after = (darkest + BEYOND_PX, OUTSIDE - FLANK_FOOT_PX);
+    let stretches = [before, after].into_iter().filter(|(from, to)| from + 2 < *to);
+    let places: Vec<usize> = stretches.flat_map(|(from, to)| from..to).collect();
+    let looks = blocks.chunks(LOOK_BLOCKS).map(|blocks| {
+        let darker = |profile: &Profile| {
+            let beyond: f32 = places.iter().map(|&k| profile[k]).sum();
+            beyond / single(places.len()) - profile[darkest]
+        };
+        blocks.iter().map(darker).sum::<f32>() / single(blocks.len())
+    });
+    let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
+    for darker in looks {
+        count += 1.0;
+        sum += darker;
+        squares += darker * darker;
+    }
+    let mean = sum / count;
+    let variance = (squares / count - mean * mean).max(0.0) / (count - 1.0_f32).max(1.0);
+    let need = if mean > DEEP * step { DARKER_SIGMAS.1 } else { DARKER_SIGMAS.0 };
+    mean > need * variance.sqrt()
+}
+
+/// Places of the ground, where it has a pattern.
+fn plain(grey: &Profile, bead: f32) -> (usize, usize) {
+    let ground = mean_of(grey, (0, OUTSIDE / 2));
+    let limit = ground + SAME * (bead - ground);
+    let foot = (1..=OUTSIDE).rev().find(|&k| grey[k - 1] < limit).unwrap_or(OUTSIDE);
+    (foot.saturating_sub(NEAR_PX), foot.max(1))
 }
 
 /// How far a groove looks too narrow to show its depth, from the length of its floor

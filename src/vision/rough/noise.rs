@@ -13,6 +13,10 @@ const MAX_LAG: usize = 6;
 /// Fraction of the irregular length of a flank by which an edge may lie elsewhere
 /// in it: half, were the flank an even ramp.
 const FLANK_FRACTION: f64 = 0.35;
+/// How far the ground's pattern between its level and the edge may be off, in standard
+/// deviations of the level from place to place: an edge that is drawn outwards by bright
+/// places finds more of them.
+const PATTERN_SIGMAS: f64 = 1.5;
 /// √(2π): the slope of a Gaussian flank is its height over that and its blur.
 const ROOT_TWO_PI: f64 = 2.506_628_274_631_000_5;
 
@@ -56,7 +60,15 @@ pub fn of_mean<T: Grey>(
     let of_flank = FLANK_FRACTION * FLANK_FRACTION * irregularity(&crossings.flank);
     // What a groove's depth leaves open is the same for both edges.
     let of_depth = DEPTH_SIGMA * f64::from(mean.filled) * mean_of(&crossings.gap);
-    let of_mean = grey / (contrast * contrast) + of_flank + 2.0 * of_depth * of_depth;
+    let of_pattern = if mean.on_ground {
+        PATTERN_SIGMAS * mean.ground_spread() * mean_of(&crossings.gap) / contrast
+    } else {
+        0.0
+    };
+    let of_mean = grey / (contrast * contrast)
+        + of_flank
+        + 2.0 * of_depth * of_depth
+        + of_pattern * of_pattern;
     Some(Noise {
         of_mean,
         of_row: of_mean * rows,
@@ -71,7 +83,7 @@ fn slope(profile: &Profile) -> f64 {
 }
 
 /// Mean of the values that are numbers.
-fn mean_of(values: &[f32]) -> f64 {
+pub fn mean_of(values: &[f32]) -> f64 {
     let seen = || values.iter().filter(|value| value.is_finite());
     seen().map(|&value| f64::from(value)).sum::<f64>() / float(seen().count().max(1))
 }
