@@ -122,9 +122,11 @@ impl Work {
     /// move them by, and refuses one that is as strong as an edge.
     pub(super) fn check_ground<T: Grey>(&mut self, strip: &Strip<'_, T>) -> Result<(), Reject> {
         let noise = f64::from(self.noise);
-        let mut got: f64 = 0.0;
+        let mut strengths = [0.0_f64; 2];
         let sides = [(&mut self.left, -1.0), (&mut self.right, 1.0)];
-        for ((tracer, outwards), contrast) in sides.into_iter().zip(self.contrasts) {
+        for (((tracer, outwards), contrast), strength) in
+            sides.into_iter().zip(self.contrasts).zip(&mut strengths)
+        {
             tracer.ground_variance = 0.0;
             if !tracer.is_on_ground {
                 continue;
@@ -137,14 +139,14 @@ impl Work {
             ));
             let side = Side { places: &self.places, outwards, blur_px: tracer.blur_px };
             let Some(pattern) = self.ground.pattern(strip, &side, noise) else { continue };
-            got = got.max(pattern.size_grey / contrast);
+            *strength = pattern.size_grey / contrast;
             // Rough edges know what the ground beside them leaves open.
             if tracer.mean_variance.is_none() {
                 let px_per_grey = PATTERN_SHARE * ROOT_TWO_PI * tracer.blur_px / contrast;
                 tracer.ground_variance = pattern.mean_variance * px_per_grey * px_per_grey;
             }
         }
-        let limit = STRONGEST_PATTERN;
+        let (got, limit) = (strengths[0].min(strengths[1]), STRONGEST_PATTERN);
         if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
