@@ -13,7 +13,7 @@ const DEEPEST_PX: f32 = 25.0;
 /// for no more. Wide, so that noise is cut off on neither side.
 const FRACTIONS: (f32, f32) = (-1.0, 2.0);
 /// Fractions beyond which a pixel shows something else than the two.
-const ODD: (f32, f32) = (-0.35, 1.35);
+const ODD: (f32, f32) = (-0.2, 1.2);
 /// Fraction of the bead that a pixel inside the edge must show.
 const BEAD: f32 = 0.5;
 /// The length of a Gaussian flank from a fifth to four fifths of its height,
