@@ -18,11 +18,18 @@ const LEAST_LINES: usize = 8;
 /// from noise.
 const TOLD: f64 = 0.25;
 
-/// Where an edge lies on a row.
+/// Places beside the edge within which a narrow groove lies \[px\].
+const GROOVE_PX: usize = 9;
+/// By how much what lies beyond a groove is brighter at least: a fraction of the
+/// contrast, and standard deviations of noise.
+const RISE: f64 = 0.015;
+const RISE_SIGMAS: f64 = 5.0;
+
+/// Where an edge lies on some rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// Row along the bead.
-    pub row: usize,
+    /// First row along the bead, and the one after the last.
+    pub rows: (usize, usize),
     /// Position across it \[px\].
     pub at: f64,
 }
@@ -36,6 +43,28 @@ pub struct Side<'a> {
     pub outwards: f64,
     /// Blur of the edge \[px\].
     pub blur_px: f64,
+}
+
+impl Side<'_> {
+    /// Mean grey level at a distance from the edge, the gauge's border beyond it.
+    fn mean_at<T: Grey>(&self, strip: &Strip<'_, T>, off: f64) -> f64 {
+        let of_place = |place: &Place| -> f64 {
+            (place.rows.0..place.rows.1).map(|row| grey(strip, row, place.at + off)).sum()
+        };
+        self.places.iter().map(of_place).sum::<f64>() / float(self.rows().max(1))
+    }
+
+    /// Number of rows.
+    fn rows(&self) -> usize {
+        self.places.iter().map(|place| place.rows.1 - place.rows.0).sum()
+    }
+}
+
+/// Grey level of a pixel, or of the nearest one in the gauge.
+fn grey<T: Grey>(strip: &Strip<'_, T>, row: usize, at: f64) -> f64 {
+    let row = strip.row(row);
+    let pixel = row[whole(narrow(at)).min(row.len() - 1)];
+    f64::from(strip.scale * T::float(pixel.add_to(T::Sum::default())))
 }
 
 /// A pattern beside an edge.
@@ -97,8 +126,8 @@ impl Ground {
             }
             let start = self.columns.len();
             self.columns.extend(side.places.iter().map(|place| {
-                let pixel = strip.row(place.row)[whole(narrow(place.at + off))];
-                f64::from(strip.scale * T::float(pixel.add_to(T::Sum::default())))
+                let row = usize::midpoint(place.rows.0, place.rows.1 - 1);
+                grey(strip, row, place.at + off)
             }));
             level(&mut self.columns[start..]);
         }
@@ -117,6 +146,20 @@ impl Ground {
         let sum = covariance(0) - noise * noise + 2.0 * later.sum::<f64>();
         sum.max(0.0) / float(count)
     }
+}
+
+/// Whether what lies beside an edge becomes brighter again away from it, as beyond a
+/// narrow groove. `noise` is the standard deviation of a pixel's, `contrast` the step
+/// \[grey levels\].
+pub fn rises<T: Grey>(strip: &Strip<'_, T>, side: &Side<'_>, noise: f64, contrast: f64) -> bool {
+    let mut darkest = f64::INFINITY;
+    let mut rise: f64 = 0.0;
+    for off in 1..=GROOVE_PX {
+        let grey = side.mean_at(strip, side.outwards * float(off));
+        darkest = darkest.min(grey);
+        rise = rise.max(grey - darkest);
+    }
+    rise > (RISE * contrast).max(RISE_SIGMAS * noise / float(side.rows().max(1)).sqrt())
 }
 
 /// Takes the straight line through values out of them.

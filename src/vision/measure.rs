@@ -71,6 +71,8 @@ struct Work {
     is_lost: bool,
     /// Whether edges were located line by line.
     is_refined: bool,
+    /// Whether a narrow groove may lie beside an edge.
+    is_beside_groove: bool,
     contrasts: [f64; 2],
     scatter: Vec<f64>,
     middles: Vec<f64>,
@@ -107,6 +109,7 @@ impl Measurer {
             least_off_px: OFF_PX,
             is_lost: false,
             is_refined: false,
+            is_beside_groove: false,
             contrasts: [0.0; 2],
             scatter: Vec::new(),
             middles: Vec::new(),
@@ -260,7 +263,7 @@ impl Work {
         self.sort_out(pair.bright)?;
         self.check_contrast()?;
         self.check_blur()?;
-        self.check_ground(strip)?;
+        self.check_ground(strip, f64::max)?;
         self.check_border(strip.across)?;
         self.width_on(view, surface)
     }

@@ -14,6 +14,7 @@
 //! ```
 
 mod crossing;
+mod groove;
 mod levels;
 mod noise;
 mod route;
@@ -23,7 +24,7 @@ use super::coarse::StepLine;
 use super::number::{float, narrow};
 use super::strip::{Grey, Strip};
 use super::trace::Located;
-use levels::{Crossings, Levels, MeanProfile};
+use levels::{Crossings, Levels, MeanProfile, OUTSIDE};
 use route::Route;
 use window::Windows;
 
@@ -75,6 +76,8 @@ pub struct RoughFit {
     pub bead_grey: f64,
     /// Whether a groove lies outside.
     pub is_groove: bool,
+    /// Whether it is too narrow to show how dark it is.
+    pub is_narrow_groove: bool,
     /// Whether what lies outside is as wide as ground.
     pub is_on_ground: bool,
     /// Share of the pixels about the edge that show neither the bead nor what lies
@@ -98,16 +101,24 @@ impl RoughEdge {
             self.levels.cross(&self.windows, self.route.rows(), &mut self.crossings);
             self.route.follow(&self.crossings.at)?;
         }
+        let groove = self.levels.mean().filter(|mean| !mean.on_ground).and_then(groove::fit);
+        if let Some(groove) = groove {
+            let shift = narrow(groove.at - float(OUTSIDE) - self.crossings.off_course);
+            for at in &mut self.crossings.at {
+                *at += shift;
+            }
+        }
         let noise = noise::of_mean(&self.windows, &self.levels, &self.crossings, scene)?;
         self.gather(scene, noise.of_row);
         let seen = self.crossings.at.iter().filter(|at| at.is_finite()).count();
         Some(RoughFit {
-            variance: noise.of_mean,
+            variance: noise.of_mean + groove.map_or(0.0, |groove| groove.variance),
             rows_fraction: float(seen) / float(self.crossings.at.len()),
             contrast: self.levels.contrast(),
             blur_px: noise.blur_px,
             bead_grey: self.levels.mean().map_or(0.0, MeanProfile::bead),
             is_groove: self.levels.mean().is_some_and(MeanProfile::is_groove),
+            is_narrow_groove: groove.is_some(),
             is_on_ground: self.levels.mean().is_some_and(|mean| mean.on_ground),
             odd_share: noise::mean_of(&self.crossings.odd),
         })

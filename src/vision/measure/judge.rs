@@ -2,7 +2,7 @@
 //! and steps that are too low.
 
 use super::Work;
-use crate::vision::ground::{Place, Side};
+use crate::vision::ground::{self, Place, Side};
 use crate::vision::number::float;
 use crate::vision::outlier;
 use crate::vision::rank;
@@ -120,8 +120,13 @@ impl Work {
 
     /// Looks at the pattern beside the bead: adds to the edges' variance what it may
     /// move them by, and refuses one that is as strong as an edge.
-    pub(super) fn check_ground<T: Grey>(&mut self, strip: &Strip<'_, T>) -> Result<(), Reject> {
+    pub(super) fn check_ground<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        of_both: fn(f64, f64) -> f64,
+    ) -> Result<(), Reject> {
         let noise = f64::from(self.noise);
+        self.is_beside_groove = false;
         let mut strengths = [0.0_f64; 2];
         let sides = [(&mut self.left, -1.0), (&mut self.right, 1.0)];
         for (((tracer, outwards), contrast), strength) in
@@ -132,12 +137,15 @@ impl Work {
                 continue;
             }
             self.places.clear();
-            self.places.extend(tracer.edges().iter().zip(&self.lines).filter_map(
-                |(edge, line)| {
-                    Some(Place { row: usize::midpoint(line.0, line.1 - 1), at: edge.as_ref()?.at })
-                },
-            ));
+            self.places.extend(
+                tracer
+                    .edges()
+                    .iter()
+                    .zip(&self.lines)
+                    .filter_map(|(edge, line)| Some(Place { rows: *line, at: edge.as_ref()?.at })),
+            );
             let side = Side { places: &self.places, outwards, blur_px: tracer.blur_px };
+            self.is_beside_groove |= ground::rises(strip, &side, noise, contrast);
             let Some(pattern) = self.ground.pattern(strip, &side, noise) else { continue };
             *strength = pattern.size_grey / contrast;
             // Rough edges know what the ground beside them leaves open.
@@ -146,7 +154,7 @@ impl Work {
                 tracer.ground_variance = pattern.mean_variance * px_per_grey * px_per_grey;
             }
         }
-        let (got, limit) = (strengths[0].min(strengths[1]), STRONGEST_PATTERN);
+        let (got, limit) = (of_both(strengths[0], strengths[1]), STRONGEST_PATTERN);
         if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 

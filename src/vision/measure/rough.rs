@@ -95,7 +95,7 @@ impl Work {
         self.right.take_rough(self.rough[1].lines(), right_fit);
         self.check_contrast()?;
         self.check_blur()?;
-        self.check_ground(strip)?;
+        self.check_ground(strip, f64::min)?;
         self.check_border(strip.across)?;
         self.width_on(view, surface)
     }
@@ -105,15 +105,16 @@ impl Work {
     /// Whether edges that were measured as blurred steps may be something else.
     pub(super) fn may_be_more_than_steps(&self) -> bool {
         let lost = |side: &Tracer| side.edges().iter().any(Option::is_none);
-        self.is_refined || lost(&self.left) || lost(&self.right)
+        self.is_refined || self.is_beside_groove || lost(&self.left) || lost(&self.right)
     }
 
     /// Whether rough edges explain more than blurred steps do: a groove that no step
     /// is, or bays in an edge that were sorted out as grains.
     pub(super) fn explains_more(&self, fits: &[RoughFit; 2]) -> bool {
-        let grooved = fits.iter().any(|fit| fit.is_groove);
+        let hidden = fits.iter().any(|fit| fit.is_narrow_groove);
+        let grooved = hidden || fits.iter().any(|fit| fit.is_groove);
         let two_levels = fits.iter().all(|fit| fit.odd_share < FEW_ODD);
-        if self.is_refined { grooved } else { two_levels && self.lost_bays() }
+        if self.is_refined { grooved } else { hidden || two_levels && self.lost_bays() }
     }
 
     /// Whether places that were sorted out lie in bays of the edges.
@@ -163,5 +164,6 @@ pub fn may_be_rough(reject: &Reject) -> bool {
             | Reject::Scattered { .. }
             | Reject::Occluded { .. }
             | Reject::Ambiguous { .. }
+            | Reject::Patterned { .. }
     )
 }

@@ -84,6 +84,8 @@ pub struct Crossings {
     pub gap: Vec<f32>,
     /// Share of odd pixels, likewise.
     pub odd: Vec<f32>,
+    /// Mean distance of the edge from the course, rounded to pixels \[px\].
+    pub off_course: f64,
 }
 
 /// Levels about one block of rows.
@@ -218,6 +220,7 @@ impl Levels {
         out.flank.clear();
         out.gap.clear();
         out.odd.clear();
+        let (mut sum, mut seen) = (0.0, 0.0);
         let ground =
             self.mean.filter(|mean| mean.on_ground).map(|mean| mean.outside.1 - GROUND_PX / 2);
         for (number, (row, &at)) in windows.all().iter().zip(course).enumerate() {
@@ -234,7 +237,12 @@ impl Levels {
             out.flank.push(found.map_or(f32::NAN, |found| found.flank));
             out.odd.push(found.map_or(f32::NAN, |found| found.odd));
             out.gap.push(found.map_or(f32::NAN, |found| found.at - flank.start));
+            if let Some(found) = found {
+                sum += f64::from(found.at - at.max(0.0).round());
+                seen += 1.0;
+            }
         }
+        out.off_course = sum / f64::max(seen, 1.0);
     }
 
     /// How much deeper than it looks a groove is taken to be \[grey levels\].
