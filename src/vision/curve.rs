@@ -15,6 +15,8 @@ const SURE: f64 = 4.0;
 pub const NOTABLE_PX: f64 = 0.25;
 /// Part of the scatter's square that more terms must explain.
 const EXPLAINED: f64 = 0.8;
+/// Largest correlation from point to point that is believed.
+const MOST_ALIKE: f64 = 0.95;
 /// Rounds in which slope and bend in the middle settle beside the higher orders.
 const ARC_PASSES: usize = 3;
 
@@ -57,10 +59,12 @@ impl Curve {
         let told = |curve: Self| Some(Self { about_parabola: off, ..curve });
         // An unsure bend would tell wrong places beyond the gauge's ends,
         // where the normals of a slanted bead may cross it.
-        if few.terms[2] * few.terms[2] < SURE * SURE * off * few.bend_variance {
+        let notable = off > NOTABLE_PX * NOTABLE_PX;
+        let apart = if notable { few.design_effect(points.clone()) } else { 1.0 };
+        if few.terms[2] * few.terms[2] < SURE * SURE * off * apart * few.bend_variance {
             return told(straight);
         }
-        if off > NOTABLE_PX * NOTABLE_PX
+        if notable
             && sums.weight >= 4.0 * float(MOST)
             && let Some((more, rest)) = Sums::<MOST>::of(points).curve::<MOST>()
             && rest < (1.0 - EXPLAINED) * off
@@ -68,6 +72,22 @@ impl Curve {
             return told(more);
         }
         told(few.as_arc(reach_px))
+    }
+
+    /// By how much the variance of a mean grows because neighbouring points lie off the
+    /// curve together, as along a torn edge: (1 + r)/(1 − r) for a correlation r from
+    /// point to point.
+    fn design_effect(&self, points: impl Iterator<Item = Point>) -> f64 {
+        let (mut squares, mut products) = (0.0, 0.0);
+        let mut last = 0.0;
+        for point in points {
+            let off = point.u - self.at(point.t);
+            squares += off * off;
+            products += off * last;
+            last = off;
+        }
+        let correlation = (products / f64::max(squares, f64::MIN_POSITIVE)).clamp(0.0, MOST_ALIKE);
+        (1.0 + correlation) / (1.0 - correlation)
     }
 
     /// A parabola, and what the arc with its slope and bend in the middle has of
