@@ -8,18 +8,19 @@ use crate::vision::number::float;
 use crate::vision::reject::Reject;
 use crate::vision::rough::{RoughFit, Scene};
 use crate::vision::strip::{Grey, Strip, View};
-use crate::vision::trace::Tracer;
+use crate::vision::trace::Located;
 use crate::vision::width::WidthMeasurement;
 
 /// The search range allows 1.5 times too wide and too narrow single places; lines
 /// are means over the gauge, and stay nearer.
 const LINE_SLACK: f32 = 1.4;
 
-/// Depth of a bay \[px\], also in standard deviations of its place, and the share of
-/// caliper lines in bays from which on they count.
-const BAY_PX: f64 = 1.0;
-const BAY_SIGMAS: f64 = 5.0;
-const FEW_BAYS: f64 = 0.015;
+/// Share of an edge's rows that may be sorted out: more are bays, or grains.
+const FEW_GAPS: f64 = 0.06;
+/// Contrast of an edge as a fraction of the other's below which it may be a rib's, and
+/// the distance at which another edge is not the same \[px\].
+const LOPSIDED: f64 = 0.6;
+const ELSEWHERE_PX: f64 = 3.0;
 /// Share of odd pixels about an edge up to which it is bead and ground alone: grains
 /// and sparks have more.
 const FEW_ODD: f64 = 0.01;
@@ -104,8 +105,31 @@ impl Work {
 impl Work {
     /// Whether edges that were measured as blurred steps may be something else.
     pub(super) fn may_be_more_than_steps(&self) -> bool {
-        let lost = |side: &Tracer| side.edges().iter().any(Option::is_none);
-        self.is_refined || self.is_beside_groove || lost(&self.left) || lost(&self.right)
+        self.is_refined || self.is_beside_groove || self.has_gaps() || self.is_lopsided()
+    }
+
+    /// Whether places of the edges were sorted out.
+    fn has_gaps(&self) -> bool {
+        let used_share = self.left.used_share().min(self.right.used_share());
+        used_share < 1.0 - FEW_GAPS
+    }
+
+    /// Whether one edge is much fainter than the other, as a rib's is.
+    fn is_lopsided(&self) -> bool {
+        let [left, right] = self.contrasts;
+        left.min(right) < LOPSIDED * left.max(right)
+    }
+
+    /// Whether rough edges lie elsewhere than the blurred steps.
+    fn is_elsewhere(&self) -> bool {
+        let middle = |places: &[Option<Located>]| {
+            let sum: f64 = places.iter().flatten().map(|place| place.at).sum();
+            sum / float(places.iter().flatten().count().max(1))
+        };
+        let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
+        sides.iter().any(|(steps, rough)| {
+            (middle(steps.edges()) - middle(rough.lines())).abs() > ELSEWHERE_PX
+        })
     }
 
     /// Whether rough edges explain more than blurred steps do: a groove that no step
@@ -113,27 +137,11 @@ impl Work {
     pub(super) fn explains_more(&self, fits: &[RoughFit; 2]) -> bool {
         let hidden = fits.iter().any(|fit| fit.is_narrow_groove);
         let grooved = hidden || fits.iter().any(|fit| fit.is_groove);
+        if self.is_lopsided() && self.is_elsewhere() {
+            return true;
+        }
         let two_levels = fits.iter().all(|fit| fit.odd_share < FEW_ODD);
-        if self.is_refined { grooved } else { hidden || two_levels && self.lost_bays() }
-    }
-
-    /// Whether places that were sorted out lie in bays of the edges.
-    fn lost_bays(&self) -> bool {
-        let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
-        let bays = sides.map(|(side, rough)| {
-            let (mut bays, mut lines) = (0, 0);
-            let mut last: Option<f64> = None;
-            for (edge, place) in side.edges().iter().zip(rough.lines()) {
-                lines += 1;
-                last = edge.map(|edge| edge.at).or(last);
-                if let (None, Some(place), Some(last)) = (edge, place, last) {
-                    let clear = BAY_PX.max(BAY_SIGMAS * place.variance.sqrt());
-                    bays += usize::from((place.at - last).abs() > clear);
-                }
-            }
-            float(bays) / float(lines.max(1))
-        });
-        bays.iter().any(|&share| share > FEW_BAYS)
+        if self.is_refined { grooved } else { hidden || two_levels && self.has_gaps() }
     }
 
     /// Refuses a pair that the bead's texture may have made.
