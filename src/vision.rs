@@ -52,6 +52,7 @@ pub mod gauge;
 mod ground;
 mod line;
 mod measure;
+mod motion;
 mod noise;
 mod normal;
 mod number;

@@ -77,12 +77,9 @@ impl Model {
     #[inline]
     pub fn at(table: &StepTable, distance: f64, blur: f64, bead_after: bool) -> Self {
         let z = distance / blur;
-        let (step, density) = table.at(z);
-        let (depth, depth_slope) = if bead_after {
-            (blur * (z * step + density), step)
-        } else {
-            (blur * (density - z * (1.0 - step)), step - 1.0)
-        };
+        let (step, density, [falling, rising]) = table.with_slopes(z);
+        let (depth, depth_slope) =
+            if bead_after { (blur * rising, step) } else { (blur * falling, step - 1.0) };
         Self { step, density: density / blur, depth, depth_slope }
     }
 }

@@ -21,12 +21,12 @@ use super::edge::Candidates;
 use super::edge_lines;
 use super::gauge::{Gauge, Method};
 use super::ground::{Ground, Place};
+use super::motion::BlurShapes;
 use super::noise;
 use super::parallel::Parallel;
 use super::pool::{self, Bands};
 use super::reject::Reject;
 use super::rough::RoughEdge;
-use super::step::StepTable;
 use super::strip::{Grey, Strip, Strips, Turner, View};
 use super::trace::Tracer;
 use super::width::{Caliper, EdgePlace, Edges, Hints, WidthMeasurement};
@@ -49,7 +49,7 @@ pub struct Measurer {
 #[derive(Debug, Clone)]
 struct Work {
     gauge: Gauge,
-    table: StepTable,
+    blur_shapes: BlurShapes,
     bands: Bands,
     lines: Vec<(usize, usize)>,
     noise: f32,
@@ -89,7 +89,7 @@ impl Measurer {
     pub fn new(gauge: Gauge, white: Option<u16>) -> Self {
         let work = Work {
             gauge,
-            table: StepTable::default(),
+            blur_shapes: BlurShapes::default(),
             bands: Bands::default(),
             lines: Vec::new(),
             noise: 0.0,

@@ -294,10 +294,8 @@ fn fill_core(part: &mut Part, table: &StepTable, shape: &Shape, first: f64) {
     for k in 0..LANES {
         let distance = first + float(k);
         let z = distance * per_blur;
-        let (step, density) = table.at(z);
-        let depth_before = blur * (density - z * (1.0 - step));
-        let depth_after = blur * (density + z * step);
-        let shading = shape.shading[0].slope * depth_before + shape.shading[1].slope * depth_after;
+        let (step, density, [falling, rising]) = table.with_slopes(z);
+        let shading = blur * (shape.shading[0].slope * falling + shape.shading[1].slope * rising);
         let counts = distance >= -shape.extent.before && distance <= shape.extent.after;
         let mask = f64::from(counts);
         part.step[k] = (step + shading) as f32;

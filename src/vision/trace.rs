@@ -251,7 +251,25 @@ impl Tracer {
         let noise = f64::from(scene.noise) / f64::from(typical(&self.step).abs());
         self.seen = self.overlay.look(table, noise, self.room(scene));
         self.look_for_texture(scene, noise);
-        self.seen.map(|seen| (seen.step.blur, seen.blur_sd))
+        self.seen.as_ref().map(Look::blur)
+    }
+
+    /// What was seen of the edge.
+    pub fn seen(&self) -> Option<&Look> {
+        self.seen.as_ref()
+    }
+
+    /// Looks at the same rows once more, with another shape of the blur. What is known
+    /// of a texture stays.
+    #[inline(always)]
+    pub fn look_again<T: Grey>(&self, table: &StepTable, scene: &Scene<'_, T>) -> Option<Look> {
+        let seen = self.seen?;
+        self.overlay.look(table, seen.pixel_noise(), self.room(scene))
+    }
+
+    /// Takes a look with another shape of the blur for what was seen.
+    pub fn take_look(&mut self, look: Look) {
+        self.seen = Some(look);
     }
 
     /// Draws the path through the picked places, as far as they are not wild, with

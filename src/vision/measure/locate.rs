@@ -5,10 +5,12 @@ use super::judge::is_strange;
 use super::search::Found;
 use super::{NEED_SHARE, OFF_PX, Work};
 use crate::vision::covered;
+use crate::vision::motion::BlurShapes;
 use crate::vision::noise;
 use crate::vision::rank;
 use crate::vision::reject::Reject;
 use crate::vision::saturated;
+use crate::vision::step::StepTable;
 use crate::vision::strip::{Grey, Strip};
 use crate::vision::trace::{Scene, Tracer};
 
@@ -43,12 +45,13 @@ impl Work {
         let right_scene = Scene { bead_after: false, ..scene };
         let scenes = [scene, right_scene];
         let mut seen = [None; 2];
+        self.blur_shapes.reset();
         (self.is_lost, self.is_refined) = (false, false);
         // A loop, so that what is inlined into it is compiled once for both.
         let sides = [(&mut self.left, lefts), (&mut self.right, rights)];
         for ((tracer, rough), (scene, seen)) in sides.into_iter().zip(scenes.iter().zip(&mut seen))
         {
-            *seen = tracer.look(&self.table, scene, rough.iter().copied());
+            *seen = tracer.look(self.blur_shapes.table(), scene, rough.iter().copied());
         }
         let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
         if let [Some(_), Some(_)] = seen {
@@ -57,19 +60,22 @@ impl Work {
                 self.least_off_px = OFF_PX;
                 let tracers = [&mut self.left, &mut self.right];
                 let bead = saturated::Bead { scenes, lefts, rights };
-                self.noise = bead.trace(tracers, &self.table, cut_off)?;
+                self.noise = bead.trace(tracers, self.blur_shapes.table(), cut_off)?;
                 return Ok(());
             }
+            let tracers = [&mut self.left, &mut self.right];
+            seen = choose_blur(&mut self.blur_shapes, tracers, &scenes).unwrap_or(seen);
         }
+        let table = self.blur_shapes.table();
         if let Some(blur) = common_blur(seen) {
             for (tracer, scene) in [&mut self.left, &mut self.right].into_iter().zip(&scenes) {
-                tracer.trace(&self.table, scene, blur);
+                tracer.trace(table, scene, blur);
             }
             if self.left.is_hidden() || self.right.is_hidden() {
                 let candidates = &self.candidates;
                 let bead = covered::Bead { scenes, candidates, bright: pair.bright };
                 let tracers = [&mut self.left, &mut self.right];
-                bead.uncover(tracers, &self.table, blur, &mut self.parallel);
+                bead.uncover(tracers, table, blur, &mut self.parallel);
             }
             self.is_lost = self.one_is_lost();
             let found = self.left.is_located() && self.right.is_located();
@@ -80,10 +86,27 @@ impl Work {
             }
         }
         (self.least_off_px, self.is_refined) = (LINE_OFF_PX, true);
-        let left = self.left.refine(&self.table, &scene);
-        let right = self.right.refine(&self.table, &right_scene);
+        let left = self.left.refine(table, &scene);
+        let right = self.right.refine(table, &right_scene);
         if left && right { Ok(()) } else { Err(failed) }
     }
+}
+
+/// Looks at both edges again with the blur's shape that fits best, where it is not a
+/// lens's alone; the blur of each and its standard deviation \[px\] with that shape.
+#[inline(always)]
+fn choose_blur<T: Grey>(
+    shapes: &mut BlurShapes,
+    [left, right]: [&mut Tracer; 2],
+    scenes: &[Scene<'_, T>; 2],
+) -> Option<[Option<(f64, f64)>; 2]> {
+    let again = |table: &StepTable| {
+        [left.look_again(table, &scenes[0]), right.look_again(table, &scenes[1])]
+    };
+    let looks = shapes.choose([left.seen()?, right.seen()?], again)?;
+    left.take_look(looks[0]);
+    right.take_look(looks[1]);
+    Some(looks.map(|look| Some(look.blur())))
 }
 
 /// Blur that both edges have, seen through one lens, and how far one may differ

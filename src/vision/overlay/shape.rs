@@ -4,9 +4,10 @@
 use super::flank::Flank;
 pub(super) use super::flank::Flanks;
 use super::slopes::Slopes;
-use super::{Overlay, REACH, ROUNDING};
+use super::{Overlay, PHASES, REACH, ROUNDING};
 use crate::vision::line::Line;
 use crate::vision::normal::Normal;
+use crate::vision::number::float;
 use crate::vision::step::StepTable;
 
 pub const LEAST_BLUR_PX: f64 = 0.3;
@@ -15,6 +16,9 @@ pub const MAX_STEPS: usize = 16;
 /// A step \[px, or blurs\] after which another would change next to nothing: each
 /// squares what is left.
 const CONVERGED: f64 = 8e-3;
+/// How far from the edge samples are fitted, in blurs and pixels beside.
+const FIT_BLURS: f64 = 4.5;
+const FIT_BESIDE_PX: f64 = 2.0;
 /// Shading that is usual close to an edge, as a standard deviation \[1/px\].
 pub const SHADING_SD: f64 = 0.02;
 
@@ -81,6 +85,29 @@ impl Look {
         ]
     }
 
+    /// Standard deviation of a sample, in shares of the step.
+    pub fn pixel_noise(&self) -> f64 {
+        self.pixel_noise
+    }
+
+    /// Blur and its standard deviation \[px\].
+    pub fn blur(&self) -> (f64, f64) {
+        (self.step.blur, self.blur_sd)
+    }
+
+    /// Mean square of the residuals about the edge, in variances of their noise: at
+    /// least 1.
+    pub fn misfit(&self) -> f64 {
+        (self.noise / self.pixel_noise).powi(2)
+    }
+
+    /// Number of samples about the edge that the misfit is the mean of.
+    pub fn samples(&self) -> f64 {
+        let reach = FIT_BLURS * self.step.blur + FIT_BESIDE_PX;
+        let Extent { before, after } = self.room;
+        float(PHASES) * (reach.min(before) + reach.min(after))
+    }
+
     /// Derivatives of the level at a distance from the path for the step's place
     /// and blur, its two levels and the two shadings, and the level itself,
     /// without flanks.
@@ -89,8 +116,8 @@ impl Look {
         let Self { step: edge, shading, .. } = self;
         let per_blur = 1.0 / edge.blur;
         let z = (at - edge.at) * per_blur;
-        let (step, density) = table.at(z);
-        let depth = [density - z * (1.0 - step), density + z * step].map(|d| d * edge.blur);
+        let (step, density, slopes) = table.with_slopes(z);
+        let depth = slopes.map(|level| level * edge.blur);
         let slope = (edge.after - edge.before) * density * per_blur;
         let level = edge.before * (1.0 - step)
             + edge.after * step
@@ -308,7 +335,7 @@ impl Overlay {
     #[inline(always)]
     fn linearise(&self, table: &StepTable, look: &Look) -> (Normal<6>, f64) {
         let Look { step: edge, room, .. } = *look;
-        let reach = 4.5 * edge.blur + 2.0;
+        let reach = FIT_BLURS * edge.blur + FIT_BESIDE_PX;
         let from = (edge.at - reach.min(room.before)).max(-place_limit());
         let to = (edge.at + reach.min(room.after)).min(place_limit());
         let mut normal = Normal::<6>::default();
