@@ -51,6 +51,7 @@ mod gamma;
 pub mod gauge;
 mod ground;
 mod line;
+mod mean_edge;
 mod measure;
 mod motion;
 mod noise;

@@ -4,6 +4,7 @@
 mod even;
 mod judge;
 mod locate;
+mod patterned;
 mod rough;
 mod search;
 #[cfg(test)]
@@ -21,6 +22,7 @@ use super::edge::Candidates;
 use super::edge_lines;
 use super::gauge::{Gauge, Method};
 use super::ground::{Ground, Place};
+use super::mean_edge::MeanEdge;
 use super::motion::BlurShapes;
 use super::noise;
 use super::parallel::Parallel;
@@ -65,6 +67,7 @@ struct Work {
     coarse: Coarse,
     pairs: Vec<LinePair>,
     rough: [RoughEdge; 2],
+    mean_edges: [MeanEdge; 2],
     left: Tracer,
     right: Tracer,
     least_off_px: f64,
@@ -73,6 +76,9 @@ struct Work {
     is_refined: bool,
     /// Whether a narrow groove may lie beside an edge.
     is_beside_groove: bool,
+    /// Standard deviation of the pattern that the ground has on both sides, as a
+    /// fraction of the contrast; 0 where one side has none.
+    pattern_share: f64,
     contrasts: [f64; 2],
     scatter: Vec<f64>,
     middles: Vec<f64>,
@@ -104,12 +110,14 @@ impl Measurer {
             coarse: Coarse::default(),
             pairs: Vec::new(),
             rough: Default::default(),
+            mean_edges: Default::default(),
             left: Tracer::default(),
             right: Tracer::default(),
             least_off_px: OFF_PX,
             is_lost: false,
             is_refined: false,
             is_beside_groove: false,
+            pattern_share: 0.0,
             contrasts: [0.0; 2],
             scatter: Vec::new(),
             middles: Vec::new(),
@@ -234,7 +242,14 @@ impl Work {
         self.noise = noise::of(strip, 0..strip.across);
         self.bands.pool(strip, self.gauge.calipers);
         pool::cut(strip.along, self.gauge.calipers, &mut self.lines);
-        match self.measure_steps(strip, range, view, surface) {
+        let found = self.measure_steps(strip, range, view, surface);
+        if found.is_ok()
+            && self.pattern_share > 0.0
+            && let Some(on_pattern) = self.measure_on_pattern(strip, range, view, surface)
+        {
+            return on_pattern;
+        }
+        match found {
             Err(reject) if may_be_rough(&reject) => {
                 self.measure_rough(strip, range, view, surface).map_err(|rough| rough.or(reject))
             }

@@ -154,6 +154,7 @@ impl Work {
                 tracer.ground_variance = pattern.mean_variance * px_per_grey * px_per_grey;
             }
         }
+        self.pattern_share = strengths[0].min(strengths[1]);
         let (got, limit) = (of_both(strengths[0], strengths[1]), STRONGEST_PATTERN);
         if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }

@@ -41,7 +41,14 @@ impl Work {
         view: &View,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
-        let fits = self.find_rough(strip, range)?;
+        let pair = self.find_lines(strip, range)?;
+        if let Some(pattern) = self.ground_pattern(strip, &pair) {
+            let found = self.measure_patterned((&pair, pattern), strip, view, surface);
+            if !matches!(found, Err(Reject::NoPair { .. })) {
+                return found;
+            }
+        }
+        let fits = self.fit_rough(strip, &pair)?;
         self.take_rough(&fits, strip, view, surface)
     }
 
@@ -53,6 +60,16 @@ impl Work {
         strip: &Strip<'_, T>,
         range: (f32, f32),
     ) -> Result<[RoughFit; 2], Reject> {
+        let pair = self.find_lines(strip, range)?;
+        self.fit_rough(strip, &pair)
+    }
+
+    /// Looks for the bead's edges as lines.
+    pub(super) fn find_lines<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        range: (f32, f32),
+    ) -> Result<LinePair, Reject> {
         let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
         let range = (LINE_SLACK * range.0, range.1 / LINE_SLACK);
         self.coarse.look(strip, (range.0 * range.1).sqrt());
@@ -62,6 +79,16 @@ impl Work {
         let pair = *self.pairs.first().ok_or(failed)?;
         self.check_stands_out(&pair)?;
         self.check_rivals(&pair)?;
+        Ok(pair)
+    }
+
+    /// Follows rough edges near two lines.
+    fn fit_rough<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        pair: &LinePair,
+    ) -> Result<[RoughFit; 2], Reject> {
+        let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
         let scene = Scene {
             strip,
             lines: &self.lines,
@@ -78,7 +105,7 @@ impl Work {
         if got < NEED_SHARE {
             return Err(Reject::NoPair { got, need: NEED_SHARE });
         }
-        even::check(&[left_fit, right_fit], even::middle_grey(strip, &pair))?;
+        even::check(&[left_fit, right_fit], even::middle_grey(strip, pair))?;
         Ok([left_fit, right_fit])
     }
 

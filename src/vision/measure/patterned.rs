@@ -1,0 +1,113 @@
+//! Beads on ground that has a pattern.
+
+use super::{NEED_SHARE, Work, even};
+use crate::calib::SurfaceMap;
+use crate::vision::coarse::LinePair;
+use crate::vision::mean_edge::{BLURS_PX, Scene};
+use crate::vision::reject::Reject;
+use crate::vision::strip::{Grey, Strip, View};
+use crate::vision::width::WidthMeasurement;
+
+/// Strongest pattern of the ground, as a fraction of the contrast: one of a third is
+/// measured, of a stronger one parts are taken for the bead.
+const STRONGEST: f64 = 0.37;
+/// Weakest pattern, as a fraction of the contrast, beside which blurred steps are not
+/// good enough: one of less draws them outwards by hardly 0.02 px.
+const NOTABLE: f64 = 0.06;
+/// Variance of the ground along the bead in that of the noise from which on it has a
+/// pattern: less is not told from noise.
+const TOLD: f64 = 1.25;
+
+impl Work {
+    /// Standard deviation of the pattern that the ground has on both sides of a pair of
+    /// lines \[grey levels\]. `None` where one side has none: what is on one side alone is
+    /// a groove or a neighbour.
+    pub(super) fn ground_pattern<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        pair: &LinePair,
+    ) -> Option<f64> {
+        let noise = f64::from(self.noise);
+        let mut least = f64::INFINITY;
+        let sides = self.mean_edges.iter_mut().zip(&pair.sides);
+        for ((edge, line), bead_after) in sides.zip([true, false]) {
+            let scene = scene(strip, &self.lines, pair, bead_after);
+            least = least.min(edge.pattern(&scene, line)?);
+        }
+        let variance = least * least;
+        (variance > TOLD * noise * noise).then(|| (variance - noise * noise).sqrt())
+    }
+
+    /// Measures a bead that was measured already, where the ground has a pattern.
+    /// `None` where it has not, or a weak one, or no lines are found.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn measure_on_pattern<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        range: (f32, f32),
+        view: &View,
+        surface: &SurfaceMap,
+    ) -> Option<Result<WidthMeasurement, Reject>> {
+        let pair = self.find_lines(strip, range).ok()?;
+        let pattern = self.ground_pattern(strip, &pair)?;
+        let contrast = self.contrasts[0].min(self.contrasts[1]);
+        if pattern < NOTABLE * contrast {
+            return None;
+        }
+        let found = self.measure_patterned((&pair, pattern), strip, view, surface);
+        if let Err(Reject::NoPair { .. }) = found { None } else { Some(found) }
+    }
+
+    /// Measures a bead whose ground has a pattern of such a standard deviation
+    /// \[grey levels\].
+    pub(super) fn measure_patterned<T: Grey>(
+        &mut self,
+        (pair, pattern): (&LinePair, f64),
+        strip: &Strip<'_, T>,
+        view: &View,
+        surface: &SurfaceMap,
+    ) -> Result<WidthMeasurement, Reject> {
+        let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
+        let scenes = [true, false].map(|after| scene(strip, &self.lines, pair, after));
+        let [left, right] = &mut self.mean_edges;
+        let of_left = left.approach(&scenes[0], &pair.sides[0], &self.table);
+        let of_right = right.approach(&scenes[1], &pair.sides[1], &self.table);
+        // Both edges are seen through one lens.
+        let left_over = |k: &usize| of_left[*k] + of_right[*k];
+        let best = (0..BLURS_PX.len()).min_by(|a, b| left_over(a).total_cmp(&left_over(b)));
+        let blur_px = best.filter(|k| left_over(k).is_finite()).map(|k| BLURS_PX[k]);
+        let blur_px = blur_px.ok_or(failed)?;
+        let one = left.locate(&scenes[0], &pair.sides[0], &self.table, blur_px).ok_or(failed)?;
+        let other = right.locate(&scenes[1], &pair.sides[1], &self.table, blur_px).ok_or(failed)?;
+        let got = pattern / one.contrast.min(other.contrast);
+        if got > STRONGEST {
+            return Err(Reject::Patterned { got, limit: STRONGEST });
+        }
+        let ground = one.samples[0].with(other.samples[0]).variance();
+        let bead = one.samples[1].with(other.samples[1]).variance();
+        if !(ground + bead).is_finite() {
+            return Err(failed);
+        }
+        let fits = [one, other].map(|fit| fit.as_rough(blur_px, ground + bead));
+        even::check(&fits, even::middle_grey(strip, pair))?;
+        self.left_px.clear();
+        self.right_px.clear();
+        let [left, right] = &self.mean_edges;
+        self.left.take_rough(left.lines(), &fits[0]);
+        self.right.take_rough(right.lines(), &fits[1]);
+        self.check_contrast()?;
+        self.check_border(strip.across)?;
+        self.width_on(view, surface)
+    }
+}
+
+/// What is looked at for one edge of a pair.
+fn scene<'a, T: Grey>(
+    strip: &'a Strip<'a, T>,
+    lines: &'a [(usize, usize)],
+    pair: &LinePair,
+    bead_after: bool,
+) -> Scene<'a, T> {
+    Scene { strip, lines, width_px: pair.width_px(), bead_after, bright: pair.bright }
+}
