@@ -24,7 +24,9 @@ use super::coarse::StepLine;
 use super::number::{float, narrow};
 use super::strip::{Grey, Strip};
 use super::trace::Located;
-use levels::{Crossings, Levels, MeanProfile, OUTSIDE};
+pub use groove::Blur;
+use groove::EdgeShape;
+use levels::{Crossings, Levels, OUTSIDE};
 use route::Route;
 use window::Windows;
 
@@ -33,6 +35,14 @@ use window::Windows;
 const ROUNDS: usize = 3;
 /// Fraction of the rows of a caliper line that must show the edge.
 const MIN_ROWS_FRACTION: f64 = 0.5;
+
+/// Blur of an edge of which nothing is known: lenses that are nearly in focus, and what is
+/// too fine to be followed.
+const UNKNOWN_BLUR: Blur = Blur { px: 1.8, variance: 1.0 };
+/// Standard deviation of the blurs of two edges about each other, as a fraction, and the
+/// same of what is too fine to be followed.
+const SAME_BLUR: f64 = 0.02;
+const FINE_FRACTION: f64 = 0.2;
 
 /// What is looked at.
 #[derive(Debug, Clone, Copy)]
@@ -59,6 +69,8 @@ pub struct RoughEdge {
     levels: Levels,
     crossings: Crossings,
     lines: Vec<Option<Located>>,
+    /// Shape of the mean profile.
+    shape: Option<EdgeShape>,
 }
 
 /// What was found of an edge.
@@ -93,7 +105,7 @@ impl RoughEdge {
 
     /// Finds the edge near a line; `None` where no edge runs there.
     #[inline(always)]
-    pub fn find<T: Grey>(&mut self, scene: &Scene<'_, T>, line: &StepLine) -> Option<RoughFit> {
+    pub fn find<T: Grey>(&mut self, scene: &Scene<'_, T>, line: &StepLine) -> Option<()> {
         self.windows.read(scene, line);
         self.route.find(&self.windows, scene.width_px)?;
         for _ in 0..ROUNDS {
@@ -101,27 +113,64 @@ impl RoughEdge {
             self.levels.cross(&self.windows, self.route.rows(), &mut self.crossings);
             self.route.follow(&self.crossings.at)?;
         }
-        let groove = self.levels.mean().filter(|mean| !mean.on_ground).and_then(groove::fit);
+        self.shape = self.fit_shape(UNKNOWN_BLUR);
+        Some(())
+    }
+
+    /// Blur of the edge that was found.
+    pub fn blur(&self) -> Option<Blur> {
+        let fine = FINE_FRACTION * noise::fine_roughness(&self.crossings);
+        self.shape.map(|shape| {
+            let Blur { px, variance } = shape.blur;
+            let other = (SAME_BLUR * px).powi(2) + (0.5 * fine / px).powi(2);
+            Blur { px, variance: variance + other }
+        })
+    }
+
+    /// Where the edge that was found lies. `other` is the blur of the other edge, which is
+    /// seen through the same lens.
+    #[inline(always)]
+    pub fn locate<T: Grey>(
+        &mut self,
+        scene: &Scene<'_, T>,
+        other: Option<Blur>,
+    ) -> Option<RoughFit> {
+        let mean = self.levels.mean()?;
+        let (is_groove, on_ground) = (mean.is_groove(), mean.on_ground);
+        let bead_grey = mean.bead();
+        let known = other.filter(|blur| blur.variance < UNKNOWN_BLUR.variance);
+        let shape = known.and_then(|blur| self.fit_shape(blur)).or(self.shape);
+        let groove = shape.filter(|shape| shape.is_groove);
+        let noise = noise::of_mean(&self.windows, &self.levels, &self.crossings, scene)?;
         if let Some(groove) = groove {
             let shift = narrow(groove.at - float(OUTSIDE) - self.crossings.off_course);
             for at in &mut self.crossings.at {
                 *at += shift;
             }
         }
-        let noise = noise::of_mean(&self.windows, &self.levels, &self.crossings, scene)?;
         self.gather(scene, noise.of_row);
         let seen = self.crossings.at.iter().filter(|at| at.is_finite()).count();
         Some(RoughFit {
-            variance: noise.of_mean + groove.map_or(0.0, |groove| groove.variance),
+            variance: groove.map_or(noise.of_mean, |groove| groove.variance),
             rows_fraction: float(seen) / float(self.crossings.at.len()),
             contrast: self.levels.contrast(),
             blur_px: noise.blur_px,
-            bead_grey: self.levels.mean().map_or(0.0, MeanProfile::bead),
-            is_groove: self.levels.mean().is_some_and(MeanProfile::is_groove),
+            bead_grey,
+            is_groove,
             is_narrow_groove: groove.is_some(),
-            is_on_ground: self.levels.mean().is_some_and(|mean| mean.on_ground),
+            is_on_ground: on_ground,
             odd_share: noise::mean_of(&self.crossings.odd),
         })
+    }
+
+    /// Fits a groove or a step to the mean profile.
+    fn fit_shape(&self, blur: Blur) -> Option<EdgeShape> {
+        let known = groove::Known {
+            variance: noise::of_profile(&self.levels)?,
+            blur,
+            roughness: noise::roughness(&self.crossings),
+        };
+        groove::fit(self.levels.mean()?, &known)
     }
 
     /// Positions of the caliper lines from those of their rows.

@@ -98,9 +98,12 @@ impl Work {
             bright: pair.bright,
         };
         let [left, right] = &mut self.rough;
-        let left_fit = left.find(&scene, &pair.sides[0]).ok_or(failed)?;
+        left.find(&scene, &pair.sides[0]).ok_or(failed)?;
         let right_scene = Scene { bead_after: false, ..scene };
-        let right_fit = right.find(&right_scene, &pair.sides[1]).ok_or(failed)?;
+        right.find(&right_scene, &pair.sides[1]).ok_or(failed)?;
+        let (left_blur, right_blur) = (left.blur(), right.blur());
+        let left_fit = left.locate(&scene, right_blur).ok_or(failed)?;
+        let right_fit = right.locate(&right_scene, left_blur).ok_or(failed)?;
         let got = left_fit.rows_fraction.min(right_fit.rows_fraction);
         if got < NEED_SHARE {
             return Err(Reject::NoPair { got, need: NEED_SHARE });

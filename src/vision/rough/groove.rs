@@ -3,43 +3,82 @@
 //! known of other grooves then says how wide it is.
 
 use super::levels::{LENGTH, MeanProfile, OUTSIDE};
-use crate::vision::normal::Normal;
+use crate::vision::normal::{Normal, Solved};
 use crate::vision::number::float;
+use nalgebra::SVector;
 
 /// Grey of a groove as a fraction of the bead's, and its standard deviation: grooves of
 /// real concrete that are wide enough to show it have 1 to 74 beside beads of 131.
 const GREY: f64 = 0.13;
 const GREY_SIGMA: f64 = 0.12;
-/// Places beyond the groove's darkest one, and within the bead, that are fitted \[px\].
+/// The same of the bead beside the edge about its level farther inside: light.
+const BEAD_SIGMA: f64 = 0.03;
+/// Places beyond the groove, and within the bead, that are fitted \[px\].
 const BEYOND_PX: usize = 9;
 const WITHIN_PX: usize = 7;
 /// Standard deviation of a mean profile about the model, as a fraction of the bead's
-/// level: light and texture that the mean over the gauge leaves.
-const MISFIT: f64 = 0.01;
-/// Rounds of the fit, and the change of position at which it ends \[px\].
-const ROUNDS: usize = 20;
+/// level, beside noise and texture: a lens's blur is no Gaussian, a camera not linear.
+const MISFIT: f64 = 0.004;
+/// Rounds of the fit, and the change of position of the groove's
+/// width at which it ends \[px\].
+const ROUNDS: usize = 40;
 const CONVERGED_PX: f64 = 1e-3;
+const CONVERGED_WIDTH_PX: f64 = 0.02;
 /// Largest change of position, width and blur in a round \[px\].
-const STEP_PX: f64 = 1.0;
-/// Largest mean square of the misfit, largest blur \[px\] and largest width \[px\] of a
-/// groove that is a blurred box: torn edges leave a wider flank, and a wider groove shows
-/// how dark it is.
-const MAX_MISFIT: f64 = 0.5;
-const MAX_BLUR_PX: f64 = 2.6;
-const MAX_WIDTH_PX: f64 = 9.0;
+const STEP_PX: f64 = 0.7;
+/// Largest mean square of the residuals of a groove that is a blurred box.
+const MAX_MISFIT: f64 = 30.0;
+/// Width of a narrow groove, from which the fit starts \[px\].
+const NARROW_PX: f64 = 2.0;
+/// Least standard deviation and largest value of the variance of the far side about the
+/// near one \[px²\].
+const APART_PX2: f64 = 0.02;
+const MAX_APART_PX2: f64 = 30.0;
 /// Ranges of width and blur \[px\].
 const WIDTH_PX: (f64, f64) = (0.5, 30.0);
 const BLUR_PX: (f64, f64) = (0.6, 6.0);
+/// Weight that holds an unknown.
+const HELD: f64 = 1e9;
+/// Places at the far end of ground that may be those of a groove's far side \[px\].
+const FAR_END_PX: usize = 4;
+/// By how much the sum of squares must fall for a dark line beside an edge on ground: four
+/// standard deviations. A wider one than that is ground.
+const DIP_COST: f64 = 16.0;
+const WIDEST_DIP_PX: f64 = 9.0;
+/// Unknowns of the fit.
+const UNKNOWNS: usize = 7;
 
-/// Where a bead beside a groove begins.
+/// Shape of an edge in the mean over its rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Groove {
-    /// Position in the mean profile \[px\].
+pub struct EdgeShape {
+    /// Where the bead begins, in the mean profile \[px\].
     pub at: f64,
     /// Its variance \[px²\].
     pub variance: f64,
-    /// Width of the groove \[px\].
-    pub width_px: f64,
+    /// Whether a groove lies beside it that does not show how dark it is.
+    pub is_groove: bool,
+    /// Blur of the bead's edge.
+    pub blur: Blur,
+}
+
+/// Blur of an edge in the mean over its rows, lens and what is too fine to be followed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Blur {
+    /// Standard deviation of the Gaussian \[px\].
+    pub px: f64,
+    /// Its variance \[px²\].
+    pub variance: f64,
+}
+
+/// What is known before the fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Known {
+    /// Variance of the mean profile for each pixel across \[grey levels²\].
+    pub variance: f64,
+    /// Blur of the bead's edge.
+    pub blur: Blur,
+    /// Variance of the edge's profile along the bead \[px²\].
+    pub roughness: f64,
 }
 
 /// A dark line between two levels, blurred.
@@ -53,22 +92,47 @@ struct Model {
     beyond: f64,
     grey: f64,
     bead: f64,
+    /// Variance by which the far side is more blurred: it does not follow the near one
+    /// \[px²\].
+    apart: f64,
 }
 
 impl Model {
-    /// Value at a place, and its derivatives by position, width, blur, level beyond and
-    /// level in the groove.
-    fn value(&self, place: f64) -> (f64, [f64; 5]) {
+    /// The unknowns in the order of the derivatives.
+    fn unknowns(&self) -> [f64; UNKNOWNS] {
+        [self.at, self.width, self.blur, self.beyond, self.grey, self.bead, self.apart]
+    }
+
+    /// The model after a step, within the ranges of its unknowns.
+    fn after(&self, step: &SVector<f64, UNKNOWNS>, bead: f64) -> Self {
+        let limited = |k: usize| step[k].clamp(-STEP_PX, STEP_PX);
+        Self {
+            at: self.at + limited(0),
+            width: (self.width + limited(1)).clamp(WIDTH_PX.0, WIDTH_PX.1),
+            blur: (self.blur + limited(2)).clamp(BLUR_PX.0, BLUR_PX.1),
+            beyond: self.beyond + step[3],
+            grey: (self.grey + step[4]).clamp(0.0, bead),
+            bead: self.bead + step[5],
+            apart: (self.apart + step[6]).clamp(0.0, MAX_APART_PX2),
+        }
+    }
+
+    /// Value at a place, and its derivatives by position, width, blur, level beyond,
+    /// level in the groove, level of the bead, and the far side's variance.
+    fn value(&self, place: f64) -> (f64, [f64; UNKNOWNS]) {
+        let far_blur = (self.blur * self.blur + self.apart).sqrt();
         let near = Edge::of(place - self.at, self.blur);
-        let far = Edge::of(place - self.at + self.width, self.blur);
+        let far = Edge::of(place - self.at + self.width, far_blur);
         let (up, down) = (self.bead - self.grey, self.beyond - self.grey);
         let value = self.beyond - down * far.share + up * near.share;
         let row = [
             down * far.slope - up * near.slope,
             -down * far.slope,
-            -down * far.by_blur + up * near.by_blur,
+            -down * far.by_blur * self.blur / far_blur + up * near.by_blur,
             1.0 - far.share,
             far.share - near.share,
+            near.share,
+            -down * far.by_blur * 0.5 / far_blur,
         ];
         (value, row)
     }
@@ -90,59 +154,131 @@ impl Edge {
     }
 }
 
-/// Fits a groove to the mean profile across an edge. `None` where the bead is not
-/// brighter than black, or no groove fits.
-pub fn fit(mean: &MeanProfile) -> Option<Groove> {
+/// What is fitted, and how what is known weighs in.
+#[derive(Clone, Copy)]
+struct Problem<'a> {
+    mean: &'a MeanProfile,
+    /// First place and the one after the last.
+    places: (usize, usize),
+    weight: f64,
+    /// What is known of the unknowns, and their standard deviations.
+    prior: Model,
+    sigmas: [f64; UNKNOWNS],
+}
+
+/// A fit that has ended.
+struct Fitted {
+    model: Model,
+    /// Sum of the squared residuals, and the same with those of what is known.
+    squares: f64,
+    cost: f64,
+    solved: Solved<UNKNOWNS>,
+}
+
+/// Fits a dark line to the mean profile across an edge, or a step where the ground beside
+/// it shows none. `None` where the bead is not brighter than black, or neither fits.
+pub fn fit(mean: &MeanProfile, known: &Known) -> Option<EdgeShape> {
     let bead = mean.bead();
     if bead <= 0.0 {
         return None;
     }
-    let darkest = usize::midpoint(mean.outside.0, mean.outside.1);
-    let (from, to) = (darkest.saturating_sub(BEYOND_PX), (OUTSIDE + WITHIN_PX).min(LENGTH));
-    let prior = GREY * bead;
-    let missing: f64 = (darkest..to).map(|k| bead - f64::from(mean.grey[k])).sum();
-    let beyond = mean.grey[from..=darkest].iter().fold(0.0, |most: f32, &v| most.max(v));
-    let mut model = Model {
+    // Of ground only what is beside the edge: its far end may be a groove's far side.
+    let trimmed = if mean.outside.0 > 0 { mean.outside.0 + FAR_END_PX } else { 0 };
+    let beyond = mean.outside.0.saturating_sub(BEYOND_PX);
+    let first = if mean.on_ground { trimmed.min(mean.darkest()) } else { beyond };
+    let last = (OUTSIDE + WITHIN_PX).min(LENGTH);
+    let narrow = Model {
         at: float(OUTSIDE),
-        width: (2.0 * missing / (bead - prior)).clamp(1.0, 0.5 * WIDTH_PX.1),
-        blur: 1.7,
-        beyond: f64::from(beyond),
-        grey: prior,
+        width: NARROW_PX,
+        blur: known.blur.px,
+        beyond: brightest(mean, first),
+        grey: GREY * bead,
         bead,
+        apart: 0.0,
     };
-    let weight = (MISFIT * bead).powi(-2);
-    let round = |model: &Model| {
-        let mut normal = Normal::<5>::default();
-        let mut squares = 0.0;
-        for k in from..to {
-            let (value, row) = model.value(float(k));
-            let miss = f64::from(mean.grey[k]) - value;
-            squares += weight * miss * miss;
-            normal.add(row, miss, weight);
-        }
-        normal.hold(4, (GREY_SIGMA * bead).powi(-2), prior - model.grey);
-        normal.hold(2, 1.0, 1.8 - model.blur);
-        Some((normal.solve()?, squares))
-    };
-    let mut found = None;
-    for _ in 0..ROUNDS {
-        let (solved, squares) = round(&model)?;
-        let step = solved.unknowns;
-        model.at += step[0].clamp(-STEP_PX, STEP_PX);
-        model.width =
-            (model.width + step[1].clamp(-STEP_PX, STEP_PX)).clamp(WIDTH_PX.0, WIDTH_PX.1);
-        model.blur = (model.blur + step[2].clamp(-STEP_PX, STEP_PX)).clamp(BLUR_PX.0, BLUR_PX.1);
-        model.beyond += step[3];
-        model.grey = (model.grey + step[4]).clamp(0.0, bead);
-        let freedom = float(to - from - 5);
-        let variance = solved.variance(0) * (squares / freedom).max(1.0);
-        let is_box = squares < MAX_MISFIT * freedom
-            && model.blur < MAX_BLUR_PX
-            && model.width < MAX_WIDTH_PX;
-        if step[0].abs() < CONVERGED_PX && is_box {
-            found = Some(Groove { at: model.at, variance, width_px: model.width });
-            break;
-        }
+    let sigmas = [
+        f64::INFINITY,
+        WIDTH_PX.1,
+        known.blur.variance.sqrt(),
+        bead,
+        GREY_SIGMA * bead,
+        BEAD_SIGMA * bead,
+        known.roughness + APART_PX2,
+    ];
+    let weight = 1.0 / (known.variance + (MISFIT * bead).powi(2));
+    let groove = Problem { mean, places: (first, last), weight, prior: narrow, sigmas };
+    let from_narrow = groove.descend(narrow);
+    if mean.on_ground {
+        let step = Model { width: WIDTH_PX.1, grey: narrow.beyond, ..narrow };
+        let sigmas = [sigmas[0], APART_PX2, sigmas[2], sigmas[3], bead, sigmas[5], APART_PX2];
+        let step = Problem { prior: step, sigmas, ..groove }.descend(step)?;
+        let dip = from_narrow
+            .filter(|dip| dip.cost + DIP_COST < step.cost && dip.model.width < WIDEST_DIP_PX);
+        return dip.map_or_else(|| groove.judge(&step, false), |dip| groove.judge(&dip, true));
     }
-    found
+    let missing: f64 = (mean.darkest()..last).map(|k| bead - f64::from(mean.grey[k])).sum();
+    let width = (2.0 * missing / (bead - narrow.grey)).clamp(NARROW_PX, 0.5 * WIDTH_PX.1);
+    let from_wide = groove.descend(Model { width, ..narrow });
+    let fitted = [from_narrow, from_wide].into_iter().flatten();
+    let best = fitted.min_by(|one, other| one.cost.total_cmp(&other.cost))?;
+    groove.judge(&best, true)
+}
+
+/// Brightest level from a place on up to the darkest one \[grey levels\].
+fn brightest(mean: &MeanProfile, from: usize) -> f64 {
+    let places = &mean.grey[from..=mean.darkest()];
+    f64::from(places.iter().fold(f32::NEG_INFINITY, |most, &grey| most.max(grey)))
+}
+
+impl Problem<'_> {
+    /// The normal equations at a model.
+    fn solve(&self, model: &Model) -> Option<Fitted> {
+        let mut normal = Normal::<UNKNOWNS>::default();
+        let (mut squares, mut held) = (0.0, 0.0);
+        for k in self.places.0..self.places.1 {
+            let (value, row) = model.value(float(k));
+            let miss = f64::from(self.mean.grey[k]) - value;
+            squares += self.weight * miss * miss;
+            normal.add(row, miss, self.weight);
+        }
+        let (values, priors) = (model.unknowns(), self.prior.unknowns());
+        for (which, sigma) in self.sigmas.iter().enumerate() {
+            let miss = priors[which] - values[which];
+            normal.hold(which, sigma.powi(-2), miss);
+            held += (miss / sigma).powi(2);
+        }
+        // What is at the end of its range stays there.
+        let ends = [(4, model.grey <= 0.0), (6, model.apart <= 0.0)];
+        for (which, _) in ends.into_iter().filter(|(_, is_at_end)| *is_at_end) {
+            if normal.vector[which] < 0.0 {
+                normal.hold(which, HELD, 0.0);
+            }
+        }
+        let solved = normal.solve()?;
+        Some(Fitted { model: *model, squares, cost: squares + held, solved })
+    }
+
+    /// The least squares from a start on.
+    fn descend(&self, mut model: Model) -> Option<Fitted> {
+        for _ in 0..ROUNDS {
+            let fitted = self.solve(&model)?;
+            let step = fitted.solved.unknowns;
+            if step[0].abs() < CONVERGED_PX && step[1].abs() < CONVERGED_WIDTH_PX {
+                return Some(fitted);
+            }
+            model = model.after(&step, self.prior.bead);
+        }
+        None
+    }
+
+    /// What a fit says, if it fits.
+    fn judge(&self, fitted: &Fitted, is_groove: bool) -> Option<EdgeShape> {
+        let (model, solved) = (&fitted.model, &fitted.solved);
+        let freedom = float((self.places.1 - self.places.0).saturating_sub(UNKNOWNS).max(1));
+        let misfit = fitted.squares / freedom;
+        let inflation = misfit.max(1.0);
+        let blur = Blur { px: model.blur, variance: solved.variance(2) * inflation };
+        let variance = solved.variance(0) * inflation;
+        (misfit < MAX_MISFIT).then_some(EdgeShape { at: model.at, variance, is_groove, blur })
+    }
 }

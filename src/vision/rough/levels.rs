@@ -121,6 +121,11 @@ impl MeanProfile {
         beyond - darkest > GROOVE_FAR_SIDE * (bead - darkest)
     }
 
+    /// The darkest place outside.
+    pub fn darkest(&self) -> usize {
+        darkest_of(&self.grey, self.outside.0)
+    }
+
     /// Level of the bead beside the edge \[grey levels\].
     pub fn bead(&self) -> f64 {
         f64::from(mean_of(&self.grey, self.inside))

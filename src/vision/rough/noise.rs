@@ -10,6 +10,9 @@ use crate::vision::strip::Grey;
 
 /// Blocks over which texture is taken to be correlated at most.
 const MAX_LAG: usize = 6;
+/// Rows over which the smoothing along the bead follows no changes: two standard
+/// deviations.
+const FINE_ROWS: usize = 5;
 /// Fraction of the irregular length of a flank by which an edge may lie elsewhere
 /// in it: half, were the flank an even ramp.
 const FLANK_FRACTION: f64 = 0.35;
@@ -74,6 +77,46 @@ pub fn of_mean<T: Grey>(
         of_row: of_mean * rows,
         blur_px: levels.contrast() / (slope * ROOT_TWO_PI),
     })
+}
+
+/// Variance of the mean profile for each pixel across \[grey levels²\]: noise and
+/// texture of the bead, and of the ground where it is more, their correlation included.
+pub fn of_profile(levels: &Levels) -> Option<f64> {
+    let mean = levels.mean()?;
+    let summed = f64::from(INSIDE_PX);
+    let inside = Stretch { places: mean.inside, summed };
+    let bead = texture(levels, &inside, |block| levels.inside(block));
+    let outside = Stretch { places: mean.ground(), summed };
+    let ground = mean.on_ground.then(|| texture(levels, &outside, |block| levels.outside(block)));
+    Some(bead.max(ground.unwrap_or(0.0)) / summed)
+}
+
+/// Variance of an edge's profile about a straight line \[px²\].
+pub fn roughness(crossings: &Crossings) -> f64 {
+    let middle = 0.5 * (float(crossings.at.len()) - 1.0);
+    let places = crossings.at.iter().enumerate().filter(|(_, at)| at.is_finite());
+    let (mut count, mut line, mut squares) = (0.0, [0.0; 2], [0.0; 2]);
+    let mean = mean_of(&crossings.at);
+    for (row, at) in places {
+        let (off, at) = (float(row) - middle, f64::from(*at) - mean);
+        count += 1.0;
+        line[0] += off * at;
+        line[1] += off * off;
+        squares[0] += at * at;
+    }
+    squares[1] = line[0] * line[0] / f64::max(line[1], 1.0);
+    (squares[0] - squares[1]).max(0.0) / f64::max(count, 1.0)
+}
+
+/// Mean square by which an edge's profile changes over [`FINE_ROWS`] rows \[px²\].
+pub fn fine_roughness(crossings: &Crossings) -> f64 {
+    let pairs = crossings.at.iter().zip(crossings.at.iter().skip(FINE_ROWS));
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (one, other) in pairs.filter(|(one, other)| one.is_finite() && other.is_finite()) {
+        sum += f64::from(other - one).powi(2);
+        count += 1.0;
+    }
+    sum / f64::max(count, 1.0)
 }
 
 /// Slope of the mean profile at the edge \[grey levels/px\].
