@@ -21,6 +21,7 @@
 //! outlier  places that disagree with their neighbours
 //! axis     places → width normal to the bead, on the surface (curve, scatter,
 //!          waviness)
+//! roughness  local widths of successive frames → roughness of the bead
 //! ```
 //!
 //! The loops over pixels are compiled once for each width of vectors that
@@ -68,6 +69,7 @@ pub(crate) mod rank;
 mod refine;
 pub mod reject;
 mod rough;
+pub mod roughness;
 mod saturated;
 mod scatter;
 mod sheet;
@@ -83,4 +85,5 @@ pub mod width;
 pub use gauge::{Axis, EdgeKind, Gauge, Method, Polarity};
 pub use measure::Measurer;
 pub use reject::Reject;
+pub use roughness::{LocalWidths, Roughness, RoughnessEstimator};
 pub use width::{Caliper, EdgePlace, Edges, Hints, WidthMeasurement};

@@ -2,6 +2,7 @@
 //! known.
 
 mod random;
+mod roughness;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -47,7 +48,12 @@ calibrations foretell.
   truebead accuracy --random torn,grooves --frames 3000 --keep-frames 20 --out random
 
 renders frames whose every parameter is drawn, uniformly in its logarithm, from
-the ranges of each set, and measures each of them alone.")]
+the ranges of each set, and measures each of them alone.
+
+  truebead accuracy --roughness
+
+lets long torn beads pass through a gauge frame by frame, and compares the roughness
+that successive frames give with that of the bead.")]
 pub struct AccuracyArgs {
     /// Frames of each set [default: 3000, with --random 30000]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
@@ -76,8 +82,15 @@ pub struct AccuracyArgs {
     /// Calibrations of each camera from rendered pictures; 0: none
     #[arg(long, value_name = "N", default_value = "100", value_parser = parse_trials)]
     rendered_trials: u64,
+    /// Roughness of torn beads from successive frames, instead of widths
+    #[arg(long, conflicts_with_all = ["calibration", "sets", "random"])]
+    roughness: bool,
+    /// With --roughness: beads that are rendered
+    #[arg(long, value_name = "N", default_value = "200", requires = "roughness", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    beads: u64,
     /// Folder for accuracy.json and accuracy.md; for calibrations
-    /// calibrations.json and calibrations.md, with --random random.json and random.md
+    /// calibrations.json and calibrations.md, with --random random.json and random.md,
+    /// with --roughness roughness.json and roughness.md
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -86,6 +99,9 @@ pub struct AccuracyArgs {
 pub fn run(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
     if args.calibration {
         return judge_calibrations(args, voice);
+    }
+    if args.roughness {
+        return roughness::judge(args, voice);
     }
     if !args.random.is_empty() {
         return random::judge(args, voice);

@@ -19,7 +19,7 @@ use crate::offline::{
     EdgesWriter, FrameRow, LogOptions, Note, OverlayWriter, Progress, RunLog, Summary,
 };
 use crate::ports::{FrameSource, Grab, SourceError};
-use crate::vision::{Measurer, Reject};
+use crate::vision::{Measurer, Reject, RoughnessEstimator};
 
 /// Frames that may wait between reading and measuring.
 const WAITING: usize = 8;
@@ -89,7 +89,8 @@ pub fn run(args: &ProcessArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     let overlays = args.overlays.then(|| OverlayWriter::create(&args.out, loaded.cell.gauge));
     let overlays = overlays.transpose()?;
     let robot_z = recorded.robot_z.as_ref();
-    let bench = Bench { loaded: &loaded, robot_z, progress, log, edges, overlays };
+    let roughness = RoughnessEstimator::default();
+    let bench = Bench { loaded: &loaded, robot_z, progress, log, roughness, edges, overlays };
     let summary = bench.measure_all(recorded.source, &stop)?;
     Ok(conclude(args, &summary, &loaded))
 }
@@ -104,6 +105,7 @@ struct Bench<'a> {
     robot_z: Option<&'a RobotZ>,
     progress: Progress,
     log: RunLog,
+    roughness: RoughnessEstimator,
     edges: Option<EdgesWriter>,
     overlays: Option<OverlayWriter>,
 }
@@ -162,11 +164,14 @@ impl Bench<'_> {
         match grab {
             Grab::Frame { frame, time_s } => {
                 let robot_z = self.robot_z.and_then(|z| z.z_at(frame.captured_at));
+                let surface = self.loaded.surface(robot_z);
                 let outcome = measurer
-                    .measure(&frame, &self.loaded.surface(robot_z))
+                    .measure(&frame, &surface)
                     .inspect_err(|reject| tracing::info!("frame {}: {reject}", frame.seq))
                     .map_err(|reject| reject.status());
-                let row = FrameRow { frame: frame.seq, time_s, outcome, control: None };
+                self.roughness.frame(measurer, outcome.as_ref().ok(), &surface);
+                let roughness = self.roughness.estimate();
+                let row = FrameRow { frame: frame.seq, time_s, outcome, roughness, control: None };
                 self.log.frame(&row, Some(&frame), Some(measurer.edges()))?;
                 if let Some(overlays) = &self.overlays {
                     overlays.frame(&frame, measurer.edges(), outcome)?;
@@ -181,7 +186,7 @@ impl Bench<'_> {
                     self.log.note(&Note::Remark(format!("frame {seq} is unreadable: {reason}")));
                 }
                 let outcome = Err(Reject::Unreadable.status());
-                let row = FrameRow { frame: seq, time_s, outcome, control: None };
+                let row = FrameRow { frame: seq, time_s, outcome, roughness: None, control: None };
                 self.log.frame(&row, None, None)?;
             }
         }
@@ -213,6 +218,9 @@ fn conclude(args: &ProcessArgs, summary: &Summary, loaded: &LoadedCell) -> ExitC
     }
     if let (Some(mean), Some(std)) = (summary.width_mean_mm, summary.width_std_mm) {
         say!("width {mean:.3} mm on average, standard deviation {std:.3} mm");
+    }
+    if let Some(words) = summary.roughness.words() {
+        say!("{words}");
     }
     for sentence in &summary.advice {
         say!("hint: {sentence}");

@@ -189,6 +189,7 @@ impl Witness for Logger {
             frame: sight.seq,
             time_s: Some(sight.captured_at.secs()),
             outcome: sight.outcome,
+            roughness: None,
             control: Some(ControlColumns::of(
                 sight.step,
                 sight.outcome.ok().map(|measured| measured.width),

@@ -17,7 +17,7 @@ use crate::io::record::FrameTap;
 use crate::ports::{FrameSource, Grab};
 use crate::time::Stamp;
 use crate::units::Mm;
-use crate::vision::{Measurer, Reject, WidthMeasurement};
+use crate::vision::{Measurer, Reject, Roughness, RoughnessEstimator, WidthMeasurement};
 
 /// What the measurement needs to know of the cell.
 pub struct Optics {
@@ -56,6 +56,9 @@ pub struct Look {
     pub had_at: Stamp,
     /// The width, or why there is none.
     pub outcome: Result<WidthMeasurement, Reject>,
+    /// Roughness of the bead from all frames up to this one; none while it is not
+    /// determined.
+    pub roughness: Option<Roughness>,
     /// The edges behind the width.
     pub edges: (Vec<ImagePoint>, Vec<ImagePoint>),
 }
@@ -133,14 +136,18 @@ fn take_frames(
 
 fn measure_frames(mailbox: &Mailbox<Taken>, optics: &Optics, tap: &FrameTap, tell: &Sender<Seen>) {
     let mut measurer = Measurer::new(optics.cell.gauge, optics.cell.white);
+    let mut estimator = RoughnessEstimator::default();
     while let Some(taken) = mailbox.take() {
         let seen = match taken {
             Taken::Frame(frame, had_at) => {
-                let outcome = measurer.measure(&frame, &optics.surface());
+                let surface = optics.surface();
+                let outcome = measurer.measure(&frame, &surface);
+                estimator.frame(&measurer, outcome.as_ref().ok(), &surface);
+                let roughness = estimator.estimate();
                 let edges = measurer.edges();
                 let frame = Arc::new(frame);
                 let edges = (edges.left.to_vec(), edges.right.to_vec());
-                let look = Look { frame: Arc::clone(&frame), had_at, outcome, edges };
+                let look = Look { frame: Arc::clone(&frame), had_at, outcome, roughness, edges };
                 if tell.send(Seen::Frame(Box::new(look))).is_err() {
                     return;
                 }

@@ -2,6 +2,7 @@
 
 pub mod calibration;
 pub mod drawn;
+pub mod roughness;
 mod table;
 mod verdict;
 

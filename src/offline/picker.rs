@@ -182,6 +182,7 @@ mod tests {
             frame: seq,
             time_s: None,
             outcome: outcome.map(|sigma| sample::measured(42.0, sigma)),
+            roughness: None,
             control: None,
         };
         picker.offer(&row, &frame, None);

@@ -2,7 +2,7 @@
 
 use crate::control::{Limit, Step};
 use crate::units::{Mm, MmPerS};
-use crate::vision::WidthMeasurement;
+use crate::vision::{Roughness, WidthMeasurement};
 
 /// One row of `widths.csv`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,6 +14,9 @@ pub struct FrameRow {
     pub time_s: Option<f64>,
     /// The width, or the status of a frame that was refused.
     pub outcome: Result<WidthMeasurement, &'static str>,
+    /// Roughness of the bead from all frames up to this one; none while it is not
+    /// determined.
+    pub roughness: Option<Roughness>,
     /// What the controller knew at that frame; none where there is no
     /// controller.
     pub control: Option<ControlColumns>,
@@ -69,14 +72,23 @@ impl ControlColumns {
 pub mod sample {
     use crate::geometry::ImagePoint;
     use crate::units::Mm;
-    use crate::vision::{Hints, WidthMeasurement};
+    use crate::vision::{Hints, Roughness, WidthMeasurement};
+
+    /// A roughness that is determined.
+    pub fn roughness() -> Roughness {
+        Roughness {
+            roughness: Mm::constant(0.1),
+            roughness_sigma: Mm::constant(0.01),
+            length: Mm::constant(5.0),
+            length_sigma: Mm::constant(1.0),
+        }
+    }
 
     /// A measurement of this width and standard deviation \[mm\].
     pub fn measured(width_mm: f64, sigma_mm: f64) -> WidthMeasurement {
         WidthMeasurement {
             width: Mm::constant(width_mm),
             sigma: Mm::constant(sigma_mm),
-            roughness: Mm::constant(0.1),
             left: ImagePoint::new(100.25, 269.5),
             right: ImagePoint::new(431.75, 269.5),
             slant_rad: 0.0,

@@ -27,6 +27,7 @@ use super::stats::{Distribution, Moments, as_f64};
 use crate::control::{Event, Step};
 use crate::time::{Span, Stamp};
 use crate::units::{Mm, Mm3PerS};
+use crate::vision::Roughness;
 
 /// What a run came to. What is not known is null.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -47,8 +48,10 @@ pub struct Summary {
     pub width_std_mm: Option<f64>,
     /// Mean of the standard deviations that the measurements claim.
     pub sigma_mean_mm: Option<f64>,
-    /// Mean waviness along the gauge.
-    pub roughness_mean_mm: Option<f64>,
+    /// Roughness of the bead from all frames, where they determine it; its keys stand
+    /// beside the others.
+    #[serde(flatten)]
+    pub roughness: RoughnessSummary,
     /// How good the pictures were.
     pub hints: HintSummary,
     /// What could be better about light and lens, in words.
@@ -83,6 +86,41 @@ pub struct HintSummary {
     pub saturated_share_mean: Option<f64>,
     /// Mean share of caliper lines in use.
     pub used_share_mean: Option<f64>,
+}
+
+/// Roughness of the bead, which no standard deviation of a width contains.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct RoughnessSummary {
+    /// Standard deviation of the local width along the bead.
+    pub roughness_mm: Option<f64>,
+    /// Its own standard deviation.
+    pub roughness_sigma_mm: Option<f64>,
+    /// Correlation length: that of exp(−|d|/length).
+    pub roughness_length_mm: Option<f64>,
+    /// Its own standard deviation.
+    pub roughness_length_sigma_mm: Option<f64>,
+}
+
+impl RoughnessSummary {
+    fn of(found: Roughness) -> Self {
+        Self {
+            roughness_mm: Some(found.roughness.get()),
+            roughness_sigma_mm: Some(found.roughness_sigma.get()),
+            roughness_length_mm: Some(found.length.get()),
+            roughness_length_sigma_mm: Some(found.length_sigma.get()),
+        }
+    }
+
+    /// In words; none where it is not determined.
+    pub fn words(&self) -> Option<String> {
+        Some(format!(
+            "roughness {:.3} ± {:.3} mm, correlation length {:.3} ± {:.3} mm",
+            self.roughness_mm?,
+            self.roughness_sigma_mm?,
+            self.roughness_length_mm?,
+            self.roughness_length_sigma_mm?
+        ))
+    }
 }
 
 impl Summary {
@@ -132,7 +170,7 @@ pub struct SummaryBuilder {
     rejected_without_bead: u64,
     width: Moments,
     sigma: Moments,
-    roughness: Moments,
+    roughness: Option<Roughness>,
     saturated: Moments,
     used: Moments,
     contrast: Distribution,
@@ -155,7 +193,7 @@ impl SummaryBuilder {
             rejected_without_bead: 0,
             width: Moments::default(),
             sigma: Moments::default(),
-            roughness: Moments::default(),
+            roughness: None,
             saturated: Moments::default(),
             used: Moments::default(),
             contrast: Distribution::default(),
@@ -190,7 +228,7 @@ impl SummaryBuilder {
             Ok(measured) => {
                 self.width.add(measured.width.get());
                 self.sigma.add(measured.sigma.get());
-                self.roughness.add(measured.roughness.get());
+                self.roughness = row.roughness;
                 self.saturated.add(measured.hints.saturated_share);
                 self.used.add(measured.hints.used_share);
                 self.contrast.add(measured.hints.contrast_grey);
@@ -250,7 +288,7 @@ impl SummaryBuilder {
             width_mean_mm: self.width.mean(),
             width_std_mm: self.width.std(),
             sigma_mean_mm: self.sigma.mean(),
-            roughness_mean_mm: self.roughness.mean(),
+            roughness: self.roughness.map_or_else(Default::default, RoughnessSummary::of),
             advice: setup::advice(&hints),
             hints,
             duration_s: self.first_s.zip(self.last_s).map(|(first, last)| last - first),

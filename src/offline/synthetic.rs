@@ -193,7 +193,13 @@ pub fn run(folder: &Path) -> Summary {
             limit: Limit::None,
             target: Some(Mm::constant(42.0)),
         };
-        let row = FrameRow { frame, time_s: Some(time), outcome, control: Some(control) };
+        let row = FrameRow {
+            frame,
+            time_s: Some(time),
+            outcome,
+            roughness: None,
+            control: Some(control),
+        };
         let shown = frame.is_multiple_of(50) || outcome.is_err();
         let picture = shown.then(|| picture(frame, width / MM_PER_PX, &mut edges));
         let found = Edges { left: &edges[0], right: &edges[1] };
@@ -217,7 +223,7 @@ pub fn process(folder: &Path) -> Summary {
         let picture = (frame.is_multiple_of(20) || frame == 0)
             .then(|| picture(frame, width / MM_PER_PX, &mut edges));
         let found = Edges { left: &edges[0], right: &edges[1] };
-        let row = FrameRow { frame, time_s: None, outcome, control: None };
+        let row = FrameRow { frame, time_s: None, outcome, roughness: None, control: None };
         log.frame(&row, picture.as_ref(), outcome.is_ok().then_some(found)).unwrap();
     }
     log.finish().unwrap()
@@ -248,7 +254,13 @@ pub fn hours(folder: &Path) -> Summary {
             limit: Limit::None,
             target: Some(Mm::constant(42.0)),
         };
-        let row = FrameRow { frame, time_s: Some(time), outcome, control: Some(control) };
+        let row = FrameRow {
+            frame,
+            time_s: Some(time),
+            outcome,
+            roughness: None,
+            control: Some(control),
+        };
         log.frame(&row, None, None).unwrap();
     }
     log.finish().unwrap()

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use super::names;
 use super::output::{LogError, Partial};
 use super::row::{ControlColumns, FrameRow};
-use crate::vision::WidthMeasurement;
+use crate::vision::{Roughness, WidthMeasurement};
 
 /// Columns of every file; the first nine are promised to other programs.
-pub const COLUMNS: [&str; 16] = [
+pub const COLUMNS: [&str; 17] = [
     "frame",
     "time_s",
     "status",
@@ -19,6 +19,7 @@ pub const COLUMNS: [&str; 16] = [
     "right_x_px",
     "right_y_px",
     "roughness_mm",
+    "roughness_length_mm",
     "slant_deg",
     "contrast_grey",
     "blur_px",
@@ -104,7 +105,7 @@ impl WidthsWriter {
         match &row.outcome {
             Ok(measured) => {
                 self.csv.write_field("ok")?;
-                for field in measured_fields(measured) {
+                for field in measured_fields(measured, row.roughness) {
                     self.csv.write_field(field)?;
                 }
             }
@@ -133,23 +134,24 @@ impl WidthsWriter {
     }
 }
 
-fn measured_fields(measured: &WidthMeasurement) -> [String; 13] {
+fn measured_fields(measured: &WidthMeasurement, roughness: Option<Roughness>) -> [String; 14] {
     [
-        measured.width.get(),
-        measured.sigma.get(),
-        measured.left.x,
-        measured.left.y,
-        measured.right.x,
-        measured.right.y,
-        measured.roughness.get(),
-        measured.slant_rad.to_degrees(),
-        measured.hints.contrast_grey,
-        measured.hints.blur_px,
-        measured.hints.noise_grey,
-        measured.hints.saturated_share,
-        measured.hints.used_share,
+        Some(measured.width.get()),
+        Some(measured.sigma.get()),
+        Some(measured.left.x),
+        Some(measured.left.y),
+        Some(measured.right.x),
+        Some(measured.right.y),
+        roughness.map(|found| found.roughness.get()),
+        roughness.map(|found| found.length.get()),
+        Some(measured.slant_rad.to_degrees()),
+        Some(measured.hints.contrast_grey),
+        Some(measured.hints.blur_px),
+        Some(measured.hints.noise_grey),
+        Some(measured.hints.saturated_share),
+        Some(measured.hints.used_share),
     ]
-    .map(|value| decimals(Some(value), 6))
+    .map(|value| decimals(value, 6))
 }
 
 fn control_fields(control: Option<&ControlColumns>) -> [String; 7] {

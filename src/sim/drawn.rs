@@ -10,12 +10,14 @@
 //! profile  edges that are random lines
 //! outline  where the borders lie on each line, and the area of the bead
 //! paint    light on the sensor: blur, motion, texture
+//! long_bead  a bead that passes through the gauge frame by frame
 //! camera   from light to grey levels: vignetting, gamma, noise, JPEG
 //! ```
 
 mod camera;
 mod draw;
 mod list;
+mod long_bead;
 mod outline;
 mod paint;
 mod profile;
@@ -32,6 +34,7 @@ use scene::Scene;
 
 pub use draw::Parameter;
 pub use list::{DrawnSet, Requirements, all, named};
+pub use long_bead::LongBead;
 
 /// Narrowest and widest bead that a gauge believes, in the bead's nominal widths.
 const RANGE: (f64, f64) = (0.6, 1.3);

@@ -104,7 +104,6 @@ pub fn width(
     Ok(WidthMeasurement {
         width: finite(sections.mean + spread.shortened)?,
         sigma: finite(spread.sigma)?,
-        roughness: finite(spread.roughness)?,
         left: edge(0),
         right: edge(1),
         slant_rad,

@@ -72,7 +72,6 @@ pub fn measure(
     Ok(WidthMeasurement {
         width,
         sigma: Mm::new(SIGMA_PX * per_px).map_err(|_| Reject::OffSurface)?,
-        roughness: Mm::ZERO,
         left: m1,
         right: m2,
         slant_rad: slope.atan(),

@@ -25,10 +25,12 @@ use super::ground::{Ground, Place};
 use super::mean_edge::MeanEdge;
 use super::motion::BlurShapes;
 use super::noise;
+use super::number::float;
 use super::parallel::Parallel;
 use super::pool::{self, Bands};
 use super::reject::Reject;
 use super::rough::RoughEdge;
+use super::roughness::{LocalWidths, Smoothing};
 use super::strip::{Grey, Strip, Strips, Turner, View};
 use super::trace::Tracer;
 use super::width::{Caliper, EdgePlace, Edges, Hints, WidthMeasurement};
@@ -150,6 +152,23 @@ impl Measurer {
             let found = left.is_some() || right.is_some();
             found.then_some(Caliper { number, left, right })
         })
+    }
+
+    /// Local widths of the frame that was measured last, as far as its caliper lines
+    /// show them and the method knows their noise.
+    pub fn local_widths(
+        &self,
+        measured: &WidthMeasurement,
+        surface: &SurfaceMap,
+    ) -> Option<LocalWidths> {
+        let lines = self.work.lines.len();
+        let along = View::new(self.gauge.roi, self.gauge.axis).along;
+        let smoothing = Smoothing {
+            filter_px: self.work.left.along_px.max(self.work.right.along_px),
+            blur_px: measured.hints.blur_px,
+            line_px: float(along) / float(lines.max(1)),
+        };
+        LocalWidths::read(self.calipers(), lines, smoothing, surface)
     }
 
     /// The next point of an edge, if it belongs to this line.

@@ -95,6 +95,8 @@ pub struct RoughFit {
     /// Share of the pixels about the edge that show neither the bead nor what lies
     /// outside.
     pub odd_share: f64,
+    /// Standard deviation of the smoothing along the bead \[px\].
+    pub along_px: f64,
 }
 
 impl RoughEdge {
@@ -160,6 +162,7 @@ impl RoughEdge {
             is_narrow_groove: groove.is_some(),
             is_on_ground: on_ground,
             odd_share: noise::mean_of(&self.crossings.odd),
+            along_px: self.windows.along_px(),
         })
     }
 

@@ -151,6 +151,9 @@ pub struct Tracer {
     pub mean_variance: Option<f64>,
     /// Variance of the whole edge's position from the pattern beside the bead \[px²\].
     pub ground_variance: f64,
+    /// Standard deviation of the smoothing along the bead that places have passed,
+    /// beside the mean over a line's rows \[px\].
+    pub along_px: f64,
 }
 
 impl Tracer {
@@ -160,6 +163,7 @@ impl Tracer {
         self.edges.extend_from_slice(places);
         self.blur_px = fit.blur_px;
         (self.common_variance, self.mean_variance) = (0.0, Some(fit.variance));
+        self.along_px = fit.along_px;
         self.misfit = f64::INFINITY;
         self.state = State::Open;
         self.is_on_ground = fit.is_on_ground && !fit.is_groove;
@@ -225,7 +229,7 @@ impl Tracer {
         rough: impl Iterator<Item = Option<f32>>,
     ) -> Option<(f64, f64)> {
         self.edges.clear();
-        self.mean_variance = None;
+        (self.mean_variance, self.along_px) = (None, 0.0);
         self.is_on_ground = true;
         self.seen = None;
         self.path.clear();

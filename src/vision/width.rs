@@ -15,9 +15,6 @@ pub struct WidthMeasurement {
     /// gauge, as the measurement believes it: the picture's share and, where it
     /// is known, the calibration's.
     pub sigma: Mm,
-    /// Standard deviation of the width along the gauge about its mean: the
-    /// bead's own waviness, which is signal.
-    pub roughness: Mm,
     /// Where the left (of a horizontal bead the upper) edge crosses the middle
     /// of the gauge, in raw image pixels.
     pub left: ImagePoint,

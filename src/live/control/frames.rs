@@ -11,7 +11,7 @@ use crate::vision::Reject;
 impl Loop<'_> {
     /// A frame that was looked at: the event, its answer and the log's row.
     pub(super) fn look(&mut self, look: Look) {
-        let Look { frame, had_at, outcome, edges } = look;
+        let Look { frame, had_at, outcome, roughness, edges } = look;
         let (seq, captured_at) = (frame.seq, frame.captured_at);
         let event = match &outcome {
             Ok(measured) => Event::Measured {
@@ -33,6 +33,7 @@ impl Loop<'_> {
             time_s: Some(captured_at.secs()),
             control: Some(self.columns(&step, outcome.as_ref().ok().map(|found| found.width))),
             outcome: outcome.map_err(|reject| reject.status()),
+            roughness,
         };
         self.scribe.frame(row, Some((frame, edges.0, edges.1)));
     }
@@ -44,7 +45,13 @@ impl Loop<'_> {
         let event = Event::Rejected { frame: seq, captured_at: at, reason: status.to_owned() };
         let step = self.give(event).step;
         let control = Some(self.columns(&step, None));
-        let row = FrameRow { frame: seq, time_s: Some(at.secs()), outcome: Err(status), control };
+        let row = FrameRow {
+            frame: seq,
+            time_s: Some(at.secs()),
+            outcome: Err(status),
+            roughness: None,
+            control,
+        };
         self.scribe.frame(row, None);
     }
 

@@ -85,7 +85,13 @@ fn the_page_says_what_to_improve_about_light_and_lens() {
         measured.hints.blur_px = 4.1;
         for frame in 0..20 {
             let outcome = Ok(measured);
-            let row = crate::offline::FrameRow { frame, time_s: None, outcome, control: None };
+            let row = crate::offline::FrameRow {
+                frame,
+                time_s: None,
+                outcome,
+                roughness: None,
+                control: None,
+            };
             log.frame(&row, None, None).unwrap();
         }
         log.finish().unwrap()

@@ -36,6 +36,7 @@ fn row(width: f64, bead_path: f64, state: &'static str) -> FrameRow {
         frame: 0,
         time_s: None,
         outcome: Ok(sample::measured(width, 0.5)),
+        roughness: None,
         control: Some(ControlColumns {
             bead_expected: true,
             bead_path: Some(Mm::new(bead_path).unwrap()),
@@ -58,6 +59,7 @@ fn widths_and_rejections_add_up() {
             frame: u64::from(frame),
             time_s: Some(f64::from(frame) * 0.5),
             outcome: outcome.map(|width| sample::measured(width, 0.5)),
+            roughness: None,
             control: None,
         });
     }
@@ -174,11 +176,23 @@ fn counts_reach_the_file_under_their_promised_keys() {
 fn light_that_is_too_strong_is_answered_with_advice() {
     let mut builder = SummaryBuilder::new(None, false);
     let mut measured = sample::measured(42.0, 0.1);
-    builder.frame(&FrameRow { frame: 0, time_s: None, outcome: Ok(measured), control: None });
+    builder.frame(&FrameRow {
+        frame: 0,
+        time_s: None,
+        outcome: Ok(measured),
+        roughness: None,
+        control: None,
+    });
     assert!(builder.finish().advice.is_empty());
     measured.hints.saturated_share = 0.25;
     for frame in 1..9 {
-        builder.frame(&FrameRow { frame, time_s: None, outcome: Ok(measured), control: None });
+        builder.frame(&FrameRow {
+            frame,
+            time_s: None,
+            outcome: Ok(measured),
+            roughness: None,
+            control: None,
+        });
     }
     let json = serde_json::to_value(builder.finish()).unwrap();
     let advice = json["advice"][0].as_str().unwrap();

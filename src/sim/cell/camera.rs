@@ -178,7 +178,6 @@ impl SimCamera {
         Ok(WidthMeasurement {
             width,
             sigma: self.noise,
-            roughness: Mm::ZERO,
             left,
             right,
             slant_rad: 0.0,

@@ -52,6 +52,8 @@ pub struct Outline {
     far: [Option<Vec<f64>>; 2],
     holes: Vec<Disc>,
     axis_px: f64,
+    /// Width of the bead before its edges were torn \[px\].
+    pub width_px: f64,
 }
 
 /// The bead before its edges are torn \[px\].
@@ -98,7 +100,7 @@ impl Outline {
             cut_bays(dug, &mut right, (bead.axis + bead.half, -1.0), draw);
             holes = dig(dug, bead, count, draw);
         }
-        Self { left, right, far, holes, axis_px: bead.axis }
+        Self { left, right, far, holes, axis_px: bead.axis, width_px: 2.0 * bead.half }
     }
 
     /// Area of the bead within some lines over their length \[px\].

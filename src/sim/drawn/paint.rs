@@ -3,6 +3,8 @@
 //! blurring that would move an edge by 0.02 px with its place within a pixel at a blur
 //! of 0.5 px, more than noise does.
 
+use std::ops::Range;
+
 use super::draw::Draw;
 use super::outline::{Outline, Step};
 use super::profile::PER_PX;
@@ -25,6 +27,22 @@ pub struct Painted {
     pub light: Vec<f32>,
     /// Area of the unblurred bead over the picture's height \[px\].
     pub truth_px: f64,
+    /// Where its borders lie, and the picture's first line of it.
+    outline: Outline,
+    first_line: usize,
+}
+
+impl Painted {
+    /// Area of the unblurred bead within some rows over their height \[px\].
+    pub fn mean_width_px(&self, rows: Range<usize>) -> f64 {
+        let line = |row: usize| self.first_line + row * PER_PX;
+        self.outline.mean_width(line(rows.start)..line(rows.end))
+    }
+
+    /// Width of the bead before its edges were torn \[px\].
+    pub fn own_width_px(&self) -> f64 {
+        self.outline.width_px
+    }
 }
 
 /// Paints a scene. A texture is that of the picture: the blur does not weaken it.
@@ -58,8 +76,9 @@ pub fn paint(scene: &Scene, draw: &mut Draw) -> Painted {
             }
         }
     }
-    let truth_px = outline.mean_width(margin * PER_PX..(margin + height) * PER_PX);
-    Painted { light, truth_px }
+    let first_line = margin * PER_PX;
+    let truth_px = outline.mean_width(first_line..(margin + height) * PER_PX);
+    Painted { light, truth_px, outline, first_line }
 }
 
 /// A unit step as pixels see it, by the distance of their centres from it.

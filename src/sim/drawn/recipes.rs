@@ -9,7 +9,7 @@ use super::scene::{Groove, Holes, Patches, Rib, Scene, Tear};
 /// Roughness of torn edges \[px\].
 const TORN_PX: (f64, f64) = (0.5, 6.0);
 /// Correlation length of rough edges \[px\].
-const LENGTH_PX: (f64, f64) = (3.0, 40.0);
+pub const LENGTH_PX: (f64, f64) = (3.0, 40.0);
 /// Largest roughness, as a fraction of the correlation length.
 const STEEPEST: f64 = 0.5;
 /// Roughness of edges in sets about something else \[px\].

@@ -25,9 +25,6 @@ pub struct Spread {
     /// What the doubt about the axis' direction takes from the width in the
     /// mean: an axis that is off by an angle shows 1 − angle²/2 of it \[mm\].
     pub shortened: f64,
-    /// Standard deviation of the width along the gauge, without that of its places
-    /// \[mm\].
-    pub roughness: f64,
 }
 
 impl Spread {
@@ -58,7 +55,7 @@ impl Spread {
         let roughness = Self::roughness(scene, sections, memory, noise);
         variance += Self::hidden(scene, sections, roughness, memory);
         let (shortened, of_tilt) = Self::tilted(scene, curves, sections, memory);
-        Self { sigma: (variance + of_tilt).sqrt(), shortened, roughness }
+        Self { sigma: (variance + of_tilt).sqrt(), shortened }
     }
 
     /// By how much the doubt about the axis' direction makes the width too

@@ -29,9 +29,15 @@ pub struct Windows {
     /// Columns of the gauge.
     width: f32,
     kernels: [Vec<f32>; 2],
+    together: usize,
 }
 
 impl Windows {
+    /// Standard deviation of the smoothing along the bead \[px\].
+    pub fn along_px(&self) -> f64 {
+        ALONG_ROWS * float(self.together)
+    }
+
     /// Number of rows.
     pub fn count(&self) -> usize {
         self.rows.len()
@@ -84,9 +90,9 @@ impl Windows {
         }
         let strip = scene.strip;
         let middle = narrow(float(strip.along) - 1.0) / 2.0;
-        let together = if strip.along > MANY_ROWS { 2 } else { 1 };
+        self.together = if strip.along > MANY_ROWS { 2 } else { 1 };
         let at = |v: f32| [line.at + line.slope * (v - middle), 0.0, 1.0];
-        self.sheet.read(strip, scene.lines, (0.3, together), at);
+        self.sheet.read(strip, scene.lines, (0.3, self.together), at);
         self.bead_after = scene.bead_after;
         self.width = narrow(float(strip.across));
         let sign = if scene.bright { 1.0 } else { -1.0 };

@@ -1,0 +1,232 @@
+//! Roughness of a bead from the local widths of successive frames.
+//!
+//! Roughness is the standard deviation of the local width along the bead, about the
+//! bead's own mean; its correlation length is that of exp(−|d|/length). One gauge is too
+//! short for both: what counts is the length of bead that has been seen. Each frame adds
+//! the squares of its cosine coefficients to a [`Spectrum`]; the estimate is the mean over
+//! the likelihood of roughness and length, given the calipers' noise and all smoothing
+//! along the bead.
+//!
+//! ```text
+//! local     local widths of a frame
+//! spectrum  their waves, and what an exponential process makes of them
+//! overlap   how much of a frame's bead is new
+//! ```
+
+mod local;
+mod overlap;
+mod spectrum;
+
+pub use local::{LocalWidths, Smoothing};
+
+use super::measure::Measurer;
+use super::width::WidthMeasurement;
+use crate::calib::SurfaceMap;
+use crate::units::Mm;
+use overlap::Overlap;
+use spectrum::{Kind, Spectrum, lengths_mm};
+
+/// Largest standard deviation of the logarithm of roughness, and of length, with which
+/// they are reported: what twenty to thirty correlation lengths of bead leave.
+const MAX_LOG_SIGMA: f64 = 0.3;
+const MAX_LENGTH_LOG_SIGMA: f64 = 0.65;
+/// By how much roughness must be more likely than noise alone, in the logarithm: three
+/// standard deviations.
+const EVIDENCE: f64 = 4.5;
+/// Kinds of frames that are told apart at most; a run has one or two.
+const MAX_KINDS: usize = 8;
+/// Steps in which the most likely roughness is looked for.
+const STEPS: usize = 12;
+
+/// Roughness of a bead. Signal, not error: the standard deviation of a width does not
+/// contain it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Roughness {
+    /// Standard deviation of the local width along the bead.
+    pub roughness: Mm,
+    /// Its own standard deviation.
+    pub roughness_sigma: Mm,
+    /// Correlation length: that of exp(−|d|/length).
+    pub length: Mm,
+    /// Its own standard deviation.
+    pub length_sigma: Mm,
+}
+
+impl Roughness {
+    /// Standard deviation of a gauge's mean width about the bead's own mean width. To be
+    /// added, as a variance, to that of a measured width by whoever wants the bead's own
+    /// mean; a width that is to hold for its gauge alone has none of it.
+    pub fn of_gauge_mean(&self, gauge: Mm) -> Mm {
+        let ratio = gauge.get().abs() / self.length.get();
+        // 1 − ratio/3 for short gauges, where the difference below is lost in rounding.
+        let part =
+            if ratio < 1e-4 { 1.0 } else { 2.0 / (ratio * ratio) * (ratio + libm::expm1(-ratio)) };
+        self.roughness * part.sqrt()
+    }
+}
+
+/// Gathers local widths over frames. Memory does not grow with their number.
+#[derive(Debug, Clone, Default)]
+pub struct RoughnessEstimator {
+    lengths_mm: Vec<f64>,
+    spectra: Vec<Spectrum>,
+    overlap: Overlap,
+}
+
+impl RoughnessEstimator {
+    /// Adds the frame that was measured last; one that was refused adds nothing. How far
+    /// the bead has moved on is not known.
+    pub fn frame(
+        &mut self,
+        measurer: &Measurer,
+        measured: Option<&WidthMeasurement>,
+        surface: &SurfaceMap,
+    ) {
+        let widths = measured.and_then(|measured| measurer.local_widths(measured, surface));
+        if let Some(widths) = widths {
+            self.add(&widths, None);
+        }
+    }
+
+    /// Adds a frame. `moved` is how far the bead has moved on since the last one that was
+    /// added, if it is known; where it is not, what both show alike counts once.
+    pub fn add(&mut self, widths: &LocalWidths, moved: Option<Mm>) {
+        if self.lengths_mm.is_empty() {
+            self.lengths_mm = lengths_mm(widths);
+        }
+        let fresh = self.overlap.fresh(widths, moved);
+        let kind = Kind::of(widths);
+        let known = self.spectra.iter().position(|spectrum| spectrum.is_of(kind));
+        let number = known.unwrap_or_else(|| {
+            if self.spectra.len() == MAX_KINDS {
+                self.spectra.remove(0);
+            }
+            self.spectra.push(Spectrum::new(widths, &self.lengths_mm));
+            self.spectra.len() - 1
+        });
+        self.spectra[number].add(widths, fresh);
+    }
+
+    /// The estimate so far; `None` while too little bead has been seen, or noise explains
+    /// what was seen.
+    pub fn estimate(&self) -> Option<Roughness> {
+        let smooth: f64 =
+            self.spectra.iter().map(|spectrum| log_likelihood(spectrum, 0, 0.0)).sum();
+        let fits: Vec<Fit> =
+            (0..self.lengths_mm.len()).map(|length| self.fit(length)).collect::<Option<_>>()?;
+        let best = fits.iter().map(|fit| fit.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
+        if best.is_nan() || best < smooth + EVIDENCE {
+            return None;
+        }
+        let (mut sum, mut roughness, mut length) = (0.0, LogMean::default(), LogMean::default());
+        for (fit, length_mm) in fits.iter().zip(&self.lengths_mm) {
+            // Beforehand 1/length is taken for uniform: uniform in the logarithm of the
+            // length, estimates from little bead would be a fifth too long.
+            let weight = (fit.log_likelihood - best).exp() * fit.log_variance.sqrt() / length_mm;
+            sum += weight;
+            roughness.add(weight, 0.5 * fit.square_mm2.ln(), 0.25 * fit.log_variance);
+            length.add(weight, length_mm.ln(), 0.0);
+        }
+        let (roughness, length) = (roughness.over(sum), length.over(sum));
+        if roughness.sigma > MAX_LOG_SIGMA || length.sigma > MAX_LENGTH_LOG_SIGMA {
+            return None;
+        }
+        let mm = |value: f64| Mm::new(value).ok();
+        let (roughness_mm, length_mm) = (roughness.mean.exp(), length.mean.exp());
+        Some(Roughness {
+            roughness: mm(roughness_mm)?,
+            roughness_sigma: mm(roughness_mm * roughness.sigma)?,
+            length: mm(length_mm)?,
+            length_sigma: mm(length_mm * length.sigma)?,
+        })
+    }
+
+    /// The most likely square of the roughness for one correlation length, by Fisher's
+    /// scoring.
+    fn fit(&self, length: usize) -> Option<Fit> {
+        let mut square = self.first_square(length)?;
+        let mut information = 0.0_f64;
+        for _ in 0..STEPS {
+            let mut slope = 0.0_f64;
+            information = 0.0_f64;
+            for spectrum in &self.spectra {
+                let noise = spectrum.noise / spectrum.frames;
+                let terms = spectrum.expected[length].iter().zip(&spectrum.passed);
+                for ((expected, passed), sum) in terms.zip(&spectrum.squares) {
+                    let rough = square * expected;
+                    let all = rough + noise * passed;
+                    let part = rough / all;
+                    slope += 0.5 * part * (sum / all - spectrum.frames);
+                    information += 0.5 * part * part * spectrum.frames;
+                }
+            }
+            // Of the logarithm, by a factor of e at most.
+            let step = slope / information;
+            if !step.is_finite() {
+                return None;
+            }
+            square *= step.clamp(-1.0, 1.0).exp();
+        }
+        let log_likelihood =
+            self.spectra.iter().map(|spectrum| log_likelihood(spectrum, length, square)).sum();
+        Some(Fit { square_mm2: square, log_variance: 1.0 / information, log_likelihood })
+    }
+
+    /// A square to begin with: all that was seen.
+    fn first_square(&self, length: usize) -> Option<f64> {
+        let seen: f64 = self.spectra.iter().flat_map(|spectrum| &spectrum.squares).sum();
+        let expected =
+            |spectrum: &Spectrum| spectrum.frames * spectrum.expected[length].iter().sum::<f64>();
+        let square = seen / self.spectra.iter().map(expected).sum::<f64>();
+        (square > 0.0 && square.is_finite()).then_some(square)
+    }
+}
+
+/// The most likely roughness for one correlation length.
+#[derive(Debug, Clone, Copy)]
+struct Fit {
+    square_mm2: f64,
+    /// Variance of the logarithm of the square.
+    log_variance: f64,
+    log_likelihood: f64,
+}
+
+/// How likely what was seen is for the square of a roughness.
+fn log_likelihood(spectrum: &Spectrum, length: usize, square_mm2: f64) -> f64 {
+    let noise = spectrum.noise / spectrum.frames;
+    let terms = spectrum.expected[length].iter().zip(&spectrum.passed).zip(&spectrum.squares);
+    let term = |((expected, passed), sum): ((&f64, &f64), &f64)| {
+        let all = (square_mm2 * expected + noise * passed).max(f64::MIN_POSITIVE);
+        -0.5 * (spectrum.frames * all.ln() + sum / all)
+    };
+    terms.map(term).sum()
+}
+
+/// Mean and standard deviation of a logarithm.
+#[derive(Debug, Clone, Copy, Default)]
+struct LogMean {
+    sum: f64,
+    squares: f64,
+}
+
+/// See [`LogMean`].
+#[derive(Debug, Clone, Copy)]
+struct Log {
+    mean: f64,
+    sigma: f64,
+}
+
+impl LogMean {
+    fn add(&mut self, weight: f64, mean: f64, variance: f64) {
+        self.sum += weight * mean;
+        self.squares += weight * (mean * mean + variance);
+    }
+
+    fn over(self, weights: f64) -> Log {
+        let mean = self.sum / weights;
+        Log { mean, sigma: (self.squares / weights - mean * mean).max(0.0).sqrt() }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,87 @@
+//! How much of a frame's bead is new, where nothing says how far the bead has moved on:
+//! two frames that show the same piece have the same widths there.
+
+use super::local::LocalWidths;
+use crate::units::Mm;
+use crate::vision::number::float;
+
+/// Smallest part of the gauge that two frames must share to be compared.
+const MIN_SHARED: f64 = 0.3;
+/// Mean square of the difference of two pieces, in that of unlike ones, below which they
+/// are taken for the same. Unlike ones are taken for the same now and then, which makes
+/// the estimate look less sure than it is.
+const SAME: f64 = 0.35;
+/// New part of a frame whose widths are too noisy to be compared: as little as of a
+/// camera that takes twenty frames of each piece.
+const UNKNOWN: f64 = 0.05;
+/// Noise in the widths' variance from which on they are.
+const NOISY: f64 = 0.3;
+
+/// Compares each frame with an earlier one, as long as both show enough of the same bead.
+#[derive(Debug, Clone, Default)]
+pub struct Overlap {
+    reference: Vec<f64>,
+    /// Lines by which the bead has moved on since.
+    moved: usize,
+}
+
+impl Overlap {
+    /// Fraction of a frame that no frame before has shown.
+    pub fn fresh(&mut self, widths: &LocalWidths, moved: Option<Mm>) -> f64 {
+        let fresh = match moved {
+            _ if self.reference.len() != widths.widths_mm.len() => 1.0,
+            Some(moved) => moved.get().abs() / widths.gauge_mm(),
+            None => return self.compare(widths),
+        };
+        self.refer_to(widths);
+        fresh.min(1.0)
+    }
+
+    fn compare(&mut self, widths: &LocalWidths) -> f64 {
+        let (before, now) = (&self.reference, &widths.widths_mm);
+        let unlike = variance(before) + variance(now);
+        if 2.0 * widths.noise_mm2 > NOISY * unlike {
+            self.refer_to(widths);
+            return UNKNOWN;
+        }
+        let lines = float(now.len());
+        let most = now.len() - whole(MIN_SHARED * lines);
+        let differs = |shift: usize| {
+            let ahead = difference(&before[shift..], now);
+            ahead.min(difference(&now[shift..], before)) / unlike
+        };
+        let shifts = (0..=most).map(|shift| (shift, differs(shift)));
+        let best = shifts.min_by(|one, other| one.1.total_cmp(&other.1));
+        let Some((shift, _)) = best.filter(|(_, differs)| *differs < SAME) else {
+            self.refer_to(widths);
+            return 1.0;
+        };
+        let fresh = float(shift.saturating_sub(self.moved)) / lines;
+        self.moved = self.moved.max(shift);
+        if 2 * shift > most {
+            self.refer_to(widths);
+        }
+        fresh
+    }
+
+    fn refer_to(&mut self, widths: &LocalWidths) {
+        self.reference.clone_from(&widths.widths_mm);
+        self.moved = 0;
+    }
+}
+
+fn variance(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / float(values.len());
+    values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / float(values.len())
+}
+
+/// Mean square of the difference, as far as both go.
+fn difference(one: &[f64], other: &[f64]) -> f64 {
+    let shared = one.len().min(other.len());
+    one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / float(shared)
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few lines")]
+fn whole(lines: f64) -> usize {
+    lines.max(0.0) as usize
+}
