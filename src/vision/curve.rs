@@ -15,6 +15,9 @@ const SURE: f64 = 4.0;
 pub const NOTABLE_PX: f64 = 0.25;
 /// Part of the scatter's square that more terms must explain.
 const EXPLAINED: f64 = 0.8;
+/// Part of it that they leave at most where they follow a bead that bends evenly: a
+/// torn edge's waves leave more.
+const ALL_BUT_NOISE: f64 = 0.02;
 /// Largest correlation from point to point that is believed.
 const MOST_ALIKE: f64 = 0.95;
 /// Rounds in which slope and bend in the middle settle beside the higher orders.
@@ -60,15 +63,17 @@ impl Curve {
         // An unsure bend would tell wrong places beyond the gauge's ends,
         // where the normals of a slanted bead may cross it.
         let notable = off > NOTABLE_PX * NOTABLE_PX;
-        let apart = if notable { few.design_effect(points.clone()) } else { 1.0 };
+        let more = (notable && sums.weight >= 4.0 * float(MOST))
+            .then(|| Sums::<MOST>::of(points.clone()).curve::<MOST>())
+            .flatten();
+        let left = more.map_or(1.0, |(_, rest)| rest / off);
+        // What more terms follow is the bead's course; waves of its edge are not.
+        let waves = notable && left > ALL_BUT_NOISE;
+        let apart = if waves { few.design_effect(points) } else { 1.0 };
         if few.terms[2] * few.terms[2] < SURE * SURE * off * apart * few.bend_variance {
             return told(straight);
         }
-        if notable
-            && sums.weight >= 4.0 * float(MOST)
-            && let Some((more, rest)) = Sums::<MOST>::of(points).curve::<MOST>()
-            && rest < (1.0 - EXPLAINED) * off
-        {
+        if let Some((more, _)) = more.filter(|_| left < 1.0 - EXPLAINED) {
             return told(more);
         }
         told(few.as_arc(reach_px))

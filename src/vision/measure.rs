@@ -13,6 +13,7 @@ mod tests;
 use crate::calib::SurfaceMap;
 use crate::frame::Frame;
 use crate::geometry::ImagePoint;
+use judge::WIDEST_BLUR_PX;
 use rough::may_be_rough;
 
 use super::axis;
@@ -296,7 +297,7 @@ impl Work {
         self.trace(strip, pair)?;
         self.sort_out(pair.bright)?;
         self.check_contrast()?;
-        self.check_blur()?;
+        self.check_blur(WIDEST_BLUR_PX)?;
         self.check_ground(strip, f64::max)?;
         self.check_border(strip.across)?;
         self.width_on(view, surface)

@@ -31,6 +31,11 @@ impl BlurShapes {
         &self.tables[self.chosen]
     }
 
+    /// A lens's blur alone.
+    pub fn lens(&self) -> &StepTable {
+        &self.tables[0]
+    }
+
     /// Goes back to a lens's blur.
     pub fn reset(&mut self) {
         self.chosen = 0;

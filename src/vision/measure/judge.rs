@@ -56,7 +56,7 @@ const ROOT_TWO_PI: f64 = 2.506_628_274_631_000_5;
 /// Widest blur of an edge that is measured \[px\]: rendered motion, a box of 20.8 px,
 /// is measured without fault up to 7.4 px of blur, and was off by some pixels from
 /// 7.5 px on.
-const WIDEST_BLUR_PX: f64 = 7.4;
+pub(super) const WIDEST_BLUR_PX: f64 = 7.4;
 
 impl Work {
     /// Whether one edge alone is hidden: then it is covered, not of another kind
@@ -112,10 +112,9 @@ impl Work {
 
     /// Refuses edges whose flanks are wider than a lens's blur: a shutter that is open
     /// while the bead moves leaves another shape, and with it another width.
-    pub(super) fn check_blur(&self) -> Result<(), Reject> {
+    pub(super) fn check_blur(&self, limit_px: f64) -> Result<(), Reject> {
         let got_px = self.left.blur_px.max(self.right.blur_px);
-        let is_wide = got_px > WIDEST_BLUR_PX;
-        if is_wide { Err(Reject::Blurred { got_px, limit_px: WIDEST_BLUR_PX }) } else { Ok(()) }
+        if got_px > limit_px { Err(Reject::Blurred { got_px, limit_px }) } else { Ok(()) }
     }
 
     /// Looks at the pattern beside the bead: adds to the edges' variance what it may

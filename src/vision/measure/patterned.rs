@@ -71,15 +71,19 @@ impl Work {
         let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
         let scenes = [true, false].map(|after| scene(strip, &self.lines, pair, after));
         let [left, right] = &mut self.mean_edges;
-        let of_left = left.approach(&scenes[0], &pair.sides[0], &self.table);
-        let of_right = right.approach(&scenes[1], &pair.sides[1], &self.table);
+        let of_left = left.approach(&scenes[0], &pair.sides[0], self.blur_shapes.lens());
+        let of_right = right.approach(&scenes[1], &pair.sides[1], self.blur_shapes.lens());
         // Both edges are seen through one lens.
         let left_over = |k: &usize| of_left[*k] + of_right[*k];
         let best = (0..BLURS_PX.len()).min_by(|a, b| left_over(a).total_cmp(&left_over(b)));
         let blur_px = best.filter(|k| left_over(k).is_finite()).map(|k| BLURS_PX[k]);
         let blur_px = blur_px.ok_or(failed)?;
-        let one = left.locate(&scenes[0], &pair.sides[0], &self.table, blur_px).ok_or(failed)?;
-        let other = right.locate(&scenes[1], &pair.sides[1], &self.table, blur_px).ok_or(failed)?;
+        let one = left
+            .locate(&scenes[0], &pair.sides[0], self.blur_shapes.lens(), blur_px)
+            .ok_or(failed)?;
+        let other = right
+            .locate(&scenes[1], &pair.sides[1], self.blur_shapes.lens(), blur_px)
+            .ok_or(failed)?;
         let got = pattern / one.contrast.min(other.contrast);
         if got > STRONGEST {
             return Err(Reject::Patterned { got, limit: STRONGEST });

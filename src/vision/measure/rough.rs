@@ -15,6 +15,9 @@ use crate::vision::width::WidthMeasurement;
 /// are means over the gauge, and stay nearer.
 const LINE_SLACK: f32 = 1.4;
 
+/// Widest blur of a rough edge \[px\]: what lies outside is looked for within 20 px, and
+/// a flank of three blurs must end before.
+const WIDEST_ROUGH_PX: f64 = 6.3;
 /// Share of an edge's rows that may be sorted out: more are bays, or grains.
 const FEW_GAPS: f64 = 0.06;
 /// Contrast of an edge as a fraction of the other's below which it may be a rib's, and
@@ -125,7 +128,7 @@ impl Work {
         self.left.take_rough(self.rough[0].lines(), left_fit);
         self.right.take_rough(self.rough[1].lines(), right_fit);
         self.check_contrast()?;
-        self.check_blur()?;
+        self.check_blur(WIDEST_ROUGH_PX)?;
         self.check_ground(strip, f64::min)?;
         self.check_border(strip.across)?;
         self.width_on(view, surface)
