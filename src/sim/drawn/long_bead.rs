@@ -107,12 +107,12 @@ mod tests {
     #[test]
     fn frames_of_one_bead_show_what_lies_within_their_rows() {
         let bead = LongBead::draw(1, 50.0);
-        assert!((50.0 * bead.length_px() - 1.0..).contains(&(bead.rows() as f64)));
+        assert!((50.0 * bead.length_px() - 1.0..).contains(&float(bead.rows())));
         let whole = (bead.rows() / 100) * 100;
         let truths: Vec<f64> = (0..whole / 100)
             .map(|frame| bead.take(frame as u64, 100 * frame).unwrap().truth_px)
             .collect();
-        let mean = truths.iter().sum::<f64>() / truths.len() as f64;
+        let mean = truths.iter().sum::<f64>() / float(truths.len());
         assert!((mean - bead.painted.mean_width_px(0..whole)).abs() < 1e-9);
         assert_ne!(bead.take(0, 0).unwrap().frame, bead.take(1, 0).unwrap().frame);
     }
