@@ -17,7 +17,7 @@ mod local;
 mod overlap;
 mod spectrum;
 
-pub use local::{LocalWidths, Smoothing};
+pub use local::{CaliperFilter, LocalWidths};
 
 use super::measure::Measurer;
 use super::width::WidthMeasurement;

@@ -127,7 +127,9 @@ impl RoughnessFigures {
                 .map(|outcome| found(outcome).map_or(1.0, |ratio| (ratio.value - 1.0).abs()));
             let found: Vec<Ratio> = outcomes.iter().filter_map(found).collect();
             let mut z = Moments::default();
-            found.iter().for_each(|ratio| z.add(ratio.value.ln() / ratio.sigma));
+            for ratio in &found {
+                z.add(ratio.value.ln() / ratio.sigma);
+            }
             (median(found.iter().map(|ratio| ratio.value)), median(errors), z.rms())
         };
         let (roughness_median, roughness_error, roughness_z) = of(|found| found.roughness);

@@ -67,7 +67,9 @@ fn quality(length: f64, advance: usize) -> Quality {
     let (mut errors, mut squares, mut found) = ([Vec::new(), Vec::new()], [0.0; 2], 0.0);
     for seed in 0..SEEDS {
         let Some(rough) = estimate(&bead(2.0, length, lines, seed), advance, None) else {
-            errors.iter_mut().for_each(|errors| errors.push(1.0));
+            for errors in &mut errors {
+                errors.push(1.0);
+            }
             continue;
         };
         found += 1.0;
