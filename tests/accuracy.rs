@@ -118,3 +118,26 @@ fn a_drawn_frame_does_not_depend_on_how_many_there_are() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(said.contains("--random tor:") && said.contains("ground-texture-weak"), "{said}");
 }
+
+/// Roughness and its length within their limits after 50 correlation lengths of bead, and
+/// widths as far from the bead's own mean as roughness says.
+#[test]
+fn successive_frames_tell_roughness() {
+    let out = tempfile::tempdir().unwrap();
+    let folder = out.path().to_str().unwrap();
+    accuracy(&["--roughness", "--beads", "100", "--out", folder]).assert().success();
+    let json = fs::read(out.path().join("roughness.json")).unwrap();
+    let figures: Vec<Value> = serde_json::from_slice(&json).unwrap();
+    let all: Vec<&Value> = figures.iter().filter(|figures| figures["part"] == "all").collect();
+    assert_eq!(all.len(), 2, "apart and overlapping");
+    for figures in all {
+        let number = |key: &str| figures[key].as_f64().unwrap();
+        assert!(number("determined_share") > 0.9, "{figures}");
+        assert!(number("roughness_error") <= 0.20, "{figures}");
+        assert!(number("length_error") <= 0.30, "{figures}");
+        assert!((0.85..=1.15).contains(&number("width_z")), "{figures}");
+        // Sigmas of the estimates hold, however often each piece is seen.
+        assert!((0.75..=1.25).contains(&number("roughness_z")), "{figures}");
+        assert!((0.75..=1.25).contains(&number("length_z")), "{figures}");
+    }
+}

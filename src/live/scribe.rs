@@ -47,7 +47,7 @@ impl Scribe {
     /// A frame that was looked at, with its picture and edges.
     pub fn frame(
         &self,
-        row: FrameRow,
+        row: &FrameRow,
         picture: Option<(Arc<Frame>, Vec<ImagePoint>, Vec<ImagePoint>)>,
     ) {
         let room = self.waiting.load(Ordering::Relaxed) < WAITING_PICTURES;
@@ -55,7 +55,7 @@ impl Scribe {
         if picture.is_some() {
             self.waiting.fetch_add(1, Ordering::Relaxed);
         }
-        self.tell(Fact::Frame { row, picture });
+        self.tell(Fact::Frame { row: *row, picture });
     }
 
     /// An event and its answer.

@@ -150,6 +150,7 @@ impl MeanFit {
             is_on_ground: true,
             odd_share: 0.0,
             along_px: 0.0,
+            lines_fraction: 1.0,
         }
     }
 }

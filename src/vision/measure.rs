@@ -31,7 +31,7 @@ use super::parallel::Parallel;
 use super::pool::{self, Bands};
 use super::reject::Reject;
 use super::rough::RoughEdge;
-use super::roughness::{LocalWidths, Smoothing};
+use super::roughness::{CaliperFilter, LocalWidths};
 use super::strip::{Grey, Strip, Strips, Turner, View};
 use super::trace::Tracer;
 use super::width::{Caliper, EdgePlace, Edges, Hints, WidthMeasurement};
@@ -164,12 +164,13 @@ impl Measurer {
     ) -> Option<LocalWidths> {
         let lines = self.work.lines.len();
         let along = View::new(self.gauge.roi, self.gauge.axis).along;
-        let smoothing = Smoothing {
+        let filter = CaliperFilter {
             filter_px: self.work.left.along_px.max(self.work.right.along_px),
             blur_px: measured.hints.blur_px,
+            noise_fractions: [&self.work.left, &self.work.right].map(|edge| edge.lines_fraction),
             line_px: float(along) / float(lines.max(1)),
         };
-        LocalWidths::read(self.calipers(), lines, smoothing, surface)
+        LocalWidths::read(self.calipers(), lines, filter, surface)
     }
 
     /// The next point of an edge, if it belongs to this line.

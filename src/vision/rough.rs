@@ -97,6 +97,8 @@ pub struct RoughFit {
     pub odd_share: f64,
     /// Standard deviation of the smoothing along the bead \[px\].
     pub along_px: f64,
+    /// Fraction of the lines' variance that differs from line to line.
+    pub lines_fraction: f64,
 }
 
 impl RoughEdge {
@@ -163,6 +165,7 @@ impl RoughEdge {
             is_on_ground: on_ground,
             odd_share: noise::mean_of(&self.crossings.odd),
             along_px: self.windows.along_px(),
+            lines_fraction: noise.lines_fraction,
         })
     }
 

@@ -17,14 +17,14 @@ mod local;
 mod overlap;
 mod spectrum;
 
-pub use local::{LocalWidths, Smoothing};
+pub use local::{CaliperFilter, LocalWidths};
 
 use super::measure::Measurer;
 use super::width::WidthMeasurement;
 use crate::calib::SurfaceMap;
 use crate::units::Mm;
 use overlap::Overlap;
-use spectrum::{Kind, Spectrum, lengths_mm};
+use spectrum::{BLURS, Kind, Spectrum, lengths_mm};
 
 /// Largest standard deviation of the logarithm of roughness, and of length, with which
 /// they are reported: what twenty to thirty correlation lengths of bead leave.
@@ -35,6 +35,8 @@ const MAX_LENGTH_LOG_SIGMA: f64 = 0.65;
 const EVIDENCE: f64 = 4.5;
 /// Kinds of frames that are told apart at most; a run has one or two.
 const MAX_KINDS: usize = 8;
+/// Part by which a smaller blur must be smaller to be taken over.
+const SMALLER: f64 = 0.95;
 /// Steps in which the most likely roughness is looked for.
 const STEPS: usize = 12;
 
@@ -69,6 +71,8 @@ impl Roughness {
 #[derive(Debug, Clone, Default)]
 pub struct RoughnessEstimator {
     lengths_mm: Vec<f64>,
+    /// Smallest blur that flanks have shown \[mm\].
+    blur_mm: f64,
     spectra: Vec<Spectrum>,
     overlap: Overlap,
 }
@@ -93,6 +97,13 @@ impl RoughnessEstimator {
     pub fn add(&mut self, widths: &LocalWidths, moved: Option<Mm>) {
         if self.lengths_mm.is_empty() {
             self.lengths_mm = lengths_mm(widths);
+            self.blur_mm = widths.blur_mm;
+        }
+        if widths.blur_mm < SMALLER * self.blur_mm {
+            self.blur_mm = widths.blur_mm;
+            for spectrum in &mut self.spectra {
+                spectrum.expect(&self.lengths_mm, self.blur_mm);
+            }
         }
         let fresh = self.overlap.fresh(widths, moved);
         let kind = Kind::of(widths);
@@ -101,7 +112,9 @@ impl RoughnessEstimator {
             if self.spectra.len() == MAX_KINDS {
                 self.spectra.remove(0);
             }
-            self.spectra.push(Spectrum::new(widths, &self.lengths_mm));
+            let mut spectrum = Spectrum::new(widths);
+            spectrum.expect(&self.lengths_mm, self.blur_mm);
+            self.spectra.push(spectrum);
             self.spectra.len() - 1
         });
         self.spectra[number].add(widths, fresh);
@@ -110,16 +123,20 @@ impl RoughnessEstimator {
     /// The estimate so far; `None` while too little bead has been seen, or noise explains
     /// what was seen.
     pub fn estimate(&self) -> Option<Roughness> {
-        let smooth: f64 =
-            self.spectra.iter().map(|spectrum| log_likelihood(spectrum, 0, 0.0)).sum();
-        let fits: Vec<Fit> =
-            (0..self.lengths_mm.len()).map(|length| self.fit(length)).collect::<Option<_>>()?;
+        let smooth: f64 = self
+            .spectra
+            .iter()
+            .map(|spectrum| log_likelihood(spectrum, &spectrum.expected[0][0], 0.0))
+            .sum();
+        let cases = (0..BLURS.len())
+            .flat_map(|blur| (0..self.lengths_mm.len()).map(move |length| Case { blur, length }));
+        let fits: Vec<Fit> = cases.map(|case| self.fit(case)).collect::<Option<_>>()?;
         let best = fits.iter().map(|fit| fit.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
-        if best.is_nan() || best < smooth + EVIDENCE {
+        if !best.is_finite() || best < smooth + EVIDENCE {
             return None;
         }
         let (mut sum, mut roughness, mut length) = (0.0, LogMean::default(), LogMean::default());
-        for (fit, length_mm) in fits.iter().zip(&self.lengths_mm) {
+        for (fit, length_mm) in fits.iter().zip(self.lengths_mm.iter().cycle()) {
             // Beforehand 1/length is taken for uniform: uniform in the logarithm of the
             // length, estimates from little bead would be a fifth too long.
             let weight = (fit.log_likelihood - best).exp() * fit.log_variance.sqrt() / length_mm;
@@ -141,17 +158,17 @@ impl RoughnessEstimator {
         })
     }
 
-    /// The most likely square of the roughness for one correlation length, by Fisher's
-    /// scoring.
-    fn fit(&self, length: usize) -> Option<Fit> {
-        let mut square = self.first_square(length)?;
+    /// The most likely square of the roughness for one blur and correlation length, by
+    /// Fisher's scoring.
+    fn fit(&self, case: Case) -> Option<Fit> {
+        let mut square = self.first_square(case)?;
         let mut information = 0.0_f64;
         for _ in 0..STEPS {
             let mut slope = 0.0_f64;
             information = 0.0_f64;
             for spectrum in &self.spectra {
                 let noise = spectrum.noise / spectrum.frames;
-                let terms = spectrum.expected[length].iter().zip(&spectrum.passed);
+                let terms = case.of(spectrum).iter().zip(&spectrum.passed);
                 for ((expected, passed), sum) in terms.zip(&spectrum.squares) {
                     let rough = square * expected;
                     let all = rough + noise * passed;
@@ -167,22 +184,42 @@ impl RoughnessEstimator {
             }
             square *= step.clamp(-1.0, 1.0).exp();
         }
-        let log_likelihood =
-            self.spectra.iter().map(|spectrum| log_likelihood(spectrum, length, square)).sum();
+        let log_likelihood = self
+            .spectra
+            .iter()
+            .map(|spectrum| log_likelihood(spectrum, case.of(spectrum), square))
+            .sum();
         Some(Fit { square_mm2: square, log_variance: 1.0 / information, log_likelihood })
     }
 
     /// A square to begin with: all that was seen.
-    fn first_square(&self, length: usize) -> Option<f64> {
-        let seen: f64 = self.spectra.iter().flat_map(|spectrum| &spectrum.squares).sum();
+    fn first_square(&self, case: Case) -> Option<f64> {
+        let seen = |spectrum: &Spectrum| -> f64 {
+            spectrum.squares.iter().take(case.of(spectrum).len()).sum()
+        };
         let expected =
-            |spectrum: &Spectrum| spectrum.frames * spectrum.expected[length].iter().sum::<f64>();
-        let square = seen / self.spectra.iter().map(expected).sum::<f64>();
+            |spectrum: &Spectrum| spectrum.frames * case.of(spectrum).iter().sum::<f64>();
+        let square = self.spectra.iter().map(seen).sum::<f64>()
+            / self.spectra.iter().map(expected).sum::<f64>();
         (square > 0.0 && square.is_finite()).then_some(square)
     }
 }
 
-/// The most likely roughness for one correlation length.
+/// A blur along the bead and a correlation length, by their numbers.
+#[derive(Debug, Clone, Copy)]
+struct Case {
+    blur: usize,
+    length: usize,
+}
+
+impl Case {
+    /// Expected squares of a spectrum for a roughness of 1.
+    fn of(self, spectrum: &Spectrum) -> &[f64] {
+        &spectrum.expected[self.blur][self.length]
+    }
+}
+
+/// The most likely roughness for one case.
 #[derive(Debug, Clone, Copy)]
 struct Fit {
     square_mm2: f64,
@@ -192,9 +229,9 @@ struct Fit {
 }
 
 /// How likely what was seen is for the square of a roughness.
-fn log_likelihood(spectrum: &Spectrum, length: usize, square_mm2: f64) -> f64 {
+fn log_likelihood(spectrum: &Spectrum, expected: &[f64], square_mm2: f64) -> f64 {
     let noise = spectrum.noise / spectrum.frames;
-    let terms = spectrum.expected[length].iter().zip(&spectrum.passed).zip(&spectrum.squares);
+    let terms = expected.iter().zip(&spectrum.passed).zip(&spectrum.squares);
     let term = |((expected, passed), sum): ((&f64, &f64), &f64)| {
         let all = (square_mm2 * expected + noise * passed).max(f64::MIN_POSITIVE);
         -0.5 * (spectrum.frames * all.ln() + sum / all)

@@ -154,6 +154,9 @@ pub struct Tracer {
     /// Standard deviation of the smoothing along the bead that places have passed,
     /// beside the mean over a line's rows \[px\].
     pub along_px: f64,
+    /// Fraction of the places' variance that differs from place to place; the rest moves
+    /// the whole edge.
+    pub lines_fraction: f64,
 }
 
 impl Tracer {
@@ -163,7 +166,7 @@ impl Tracer {
         self.edges.extend_from_slice(places);
         self.blur_px = fit.blur_px;
         (self.common_variance, self.mean_variance) = (0.0, Some(fit.variance));
-        self.along_px = fit.along_px;
+        (self.along_px, self.lines_fraction) = (fit.along_px, fit.lines_fraction);
         self.misfit = f64::INFINITY;
         self.state = State::Open;
         self.is_on_ground = fit.is_on_ground && !fit.is_groove;
@@ -229,7 +232,7 @@ impl Tracer {
         rough: impl Iterator<Item = Option<f32>>,
     ) -> Option<(f64, f64)> {
         self.edges.clear();
-        (self.mean_variance, self.along_px) = (None, 0.0);
+        (self.mean_variance, self.along_px, self.lines_fraction) = (None, 0.0, 1.0);
         self.is_on_ground = true;
         self.seen = None;
         self.path.clear();

@@ -35,7 +35,7 @@ impl Loop<'_> {
             outcome: outcome.map_err(|reject| reject.status()),
             roughness,
         };
-        self.scribe.frame(row, Some((frame, edges.0, edges.1)));
+        self.scribe.frame(&row, Some((frame, edges.0, edges.1)));
     }
 
     /// A frame that cannot be read.
@@ -52,7 +52,7 @@ impl Loop<'_> {
             roughness: None,
             control,
         };
-        self.scribe.frame(row, None);
+        self.scribe.frame(&row, None);
     }
 
     fn columns(&self, step: &Step, width: Option<Mm>) -> ControlColumns {

@@ -30,6 +30,8 @@ pub struct Noise {
     pub of_mean: f64,
     /// Variance of a single row, as if rows were independent \[px²\].
     pub of_row: f64,
+    /// Fraction of it that differs from line to line; the rest moves the whole edge.
+    pub lines_fraction: f64,
     /// Standard deviation of the Gaussian with the flank's slope \[px\].
     pub blur_px: f64,
 }
@@ -68,13 +70,12 @@ pub fn of_mean<T: Grey>(
     } else {
         0.0
     };
-    let of_mean = grey / (contrast * contrast)
-        + of_flank
-        + 2.0 * of_depth * of_depth
-        + of_pattern * of_pattern;
+    let of_lines = grey / (contrast * contrast) + of_flank;
+    let of_mean = of_lines + 2.0 * of_depth * of_depth + of_pattern * of_pattern;
     Some(Noise {
         of_mean,
         of_row: of_mean * rows,
+        lines_fraction: of_lines / of_mean,
         blur_px: levels.contrast() / (slope * ROOT_TWO_PI),
     })
 }

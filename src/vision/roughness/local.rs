@@ -28,13 +28,16 @@ pub struct LocalWidths {
     pub blur_mm: f64,
 }
 
-/// Smoothing along the bead \[px\]; see [`LocalWidths`].
+/// What the calipers' places have passed along the bead \[px\]; see [`LocalWidths`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Smoothing {
+pub struct CaliperFilter {
     /// That of the measurement.
     pub filter_px: f64,
     /// That of the lens.
     pub blur_px: f64,
+    /// Fraction of each edge's variance that differs from line to line; the rest moves the
+    /// whole edge, and is none of a local width's noise.
+    pub noise_fractions: [f64; 2],
     /// Distance of caliper lines.
     pub line_px: f64,
 }
@@ -53,11 +56,12 @@ impl LocalWidths {
     pub fn read(
         calipers: impl Iterator<Item = Caliper>,
         lines: usize,
-        smoothing: Smoothing,
+        filter: CaliperFilter,
         surface: &SurfaceMap,
     ) -> Option<Self> {
-        let sections: Vec<Section> =
-            calipers.filter_map(|caliper| Section::of(&caliper, surface)).collect();
+        let sections: Vec<Section> = calipers
+            .filter_map(|caliper| Section::of(&caliper, filter.noise_fractions, surface))
+            .collect();
         let missing = count(lines - sections.len().min(lines));
         if sections.len() < MIN_LINES || missing > MAX_MISSING * count(lines) {
             return None;
@@ -66,15 +70,15 @@ impl LocalWidths {
         let (first, last) = (sections.first()?, sections.last()?);
         let length_mm = (last.middle - first.middle).dot(&axis);
         let spacing_mm = length_mm / count(last.number - first.number);
-        let mm_per_px = spacing_mm / smoothing.line_px;
+        let mm_per_px = spacing_mm / filter.line_px;
         let normal = Vector2::new(-axis.y, axis.x);
         let noise_mm2 = sections.iter().map(|section| section.noise_mm2).sum::<f64>();
         Some(Self {
             widths_mm: fill(lines, &sections, |section| section.across.dot(&normal).abs()),
             spacing_mm,
             noise_mm2: noise_mm2 / count(sections.len()),
-            filter_mm: smoothing.filter_px * mm_per_px,
-            blur_mm: smoothing.blur_px * mm_per_px,
+            filter_mm: filter.filter_px * mm_per_px,
+            blur_mm: filter.blur_px * mm_per_px,
         })
     }
 
@@ -85,13 +89,14 @@ impl LocalWidths {
 }
 
 impl Section {
-    fn of(caliper: &Caliper, surface: &SurfaceMap) -> Option<Self> {
+    fn of(caliper: &Caliper, fractions: [f64; 2], surface: &SurfaceMap) -> Option<Self> {
         let (left, right) = (caliper.left?, caliper.right?);
         let (from, to) = (surface.to_mm(left.at)?, surface.to_mm(right.at)?);
         let across = to - from;
         let mm_per_px = across.norm() / (right.at - left.at).norm();
         let sigmas = (left.sigma_px?, right.sigma_px?);
-        let noise_mm2 = (sigmas.0.powi(2) + sigmas.1.powi(2)) * mm_per_px * mm_per_px;
+        let noise_px2 = fractions[0] * sigmas.0.powi(2) + fractions[1] * sigmas.1.powi(2);
+        let noise_mm2 = noise_px2 * mm_per_px * mm_per_px;
         let middle = nalgebra::center(&from, &to);
         (noise_mm2.is_finite()).then_some(Self {
             number: caliper.number,
@@ -154,26 +159,26 @@ mod tests {
         (0..20).filter(|number| !(3..5).contains(number)).map(caliper).collect()
     }
 
-    const SMOOTHING: Smoothing = Smoothing { filter_px: 2.5, blur_px: 1.5, line_px: 4.0 };
+    const FILTER: CaliperFilter =
+        CaliperFilter { filter_px: 2.5, blur_px: 1.5, noise_fractions: [1.0, 0.5], line_px: 4.0 };
 
     #[test]
     fn widths_are_normal_to_the_axis_and_missing_ones_are_filled() {
         let surface = SurfaceMap::from_scale(0.5);
         let slope: f64 = 0.2;
-        let widths =
-            LocalWidths::read(slanted(slope).into_iter(), 20, SMOOTHING, &surface).unwrap();
+        let widths = LocalWidths::read(slanted(slope).into_iter(), 20, FILTER, &surface).unwrap();
         let cosine = 1.0 / (1.0 + slope * slope).sqrt();
         assert_eq!(widths.widths_mm.len(), 20);
         assert!(widths.widths_mm.iter().all(|width| (width - 20.0 * cosine).abs() < 1e-9));
         assert!((widths.spacing_mm - 2.0 / cosine).abs() < 1e-9);
         assert!((widths.filter_mm - 1.25 / cosine).abs() < 1e-9);
-        assert!((widths.noise_mm2 - 2.0 * 0.05_f64.powi(2)).abs() < 1e-12);
+        assert!((widths.noise_mm2 - 1.5 * 0.05_f64.powi(2)).abs() < 1e-12);
     }
 
     #[test]
     fn a_frame_of_which_too_much_is_missing_tells_nothing() {
         let surface = SurfaceMap::from_scale(1.0);
         let few = slanted(0.0).into_iter().take(12);
-        assert_eq!(LocalWidths::read(few, 20, SMOOTHING, &surface), None);
+        assert_eq!(LocalWidths::read(few, 20, FILTER, &surface), None);
     }
 }

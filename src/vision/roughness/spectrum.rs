@@ -16,6 +16,13 @@ use crate::vision::number::float;
 const SHORTEST: f64 = 0.5;
 /// Their number.
 const LENGTHS: usize = 28;
+/// Blurs along the bead that are tried, as fractions of the smallest one that flanks have
+/// shown: torn flanks look more blurred than the lens makes them, and motion across the
+/// bead blurs nothing along it.
+pub const BLURS: [f64; 4] = [0.4, 0.6, 0.8, 1.0];
+/// Waves that smoothing leaves less than this part of their square are left out: what is
+/// left of them says more about the smoothing than about the bead.
+const MIN_LEFT: f64 = 0.2;
 /// Steps of a doubling of the smoothing that is taken for the same.
 const SAME_SMOOTHING: f64 = 4.0;
 /// A Gaussian is taken for nothing beyond so many standard deviations.
@@ -26,22 +33,15 @@ const FAR: f64 = 6.0;
 pub struct Kind {
     lines: usize,
     filter: i32,
-    blur: i32,
 }
 
 impl Kind {
     /// That of a frame.
     pub fn of(widths: &LocalWidths) -> Self {
+        let ratio = (widths.filter_mm / widths.spacing_mm).max(0.1);
         #[expect(clippy::cast_possible_truncation, reason = "within some tens")]
-        let step = |mm: f64| {
-            let ratio = (mm / widths.spacing_mm).max(0.1);
-            (SAME_SMOOTHING * ratio.log2()).round() as i32
-        };
-        Self {
-            lines: widths.widths_mm.len(),
-            filter: step(widths.filter_mm),
-            blur: step(widths.blur_mm),
-        }
+        let filter = (SAME_SMOOTHING * ratio.log2()).round() as i32;
+        Self { lines: widths.widths_mm.len(), filter }
     }
 }
 
@@ -49,6 +49,8 @@ impl Kind {
 #[derive(Debug, Clone)]
 pub struct Spectrum {
     kind: Kind,
+    spacing_mm: f64,
+    filter_mm: f64,
     basis: Vec<f64>,
     /// Squares of the coefficients but the first, added up over frames \[mm²\].
     pub squares: Vec<f64>,
@@ -58,37 +60,43 @@ pub struct Spectrum {
     pub noise: f64,
     /// What noise has passed, by coefficient.
     pub passed: Vec<f64>,
-    /// Expected squares for a roughness of 1, by correlation length and coefficient.
-    pub expected: Vec<Vec<f64>>,
+    /// Expected squares for a roughness of 1, by blur, correlation length and coefficient,
+    /// as far as the smoothing leaves enough of them.
+    pub expected: Vec<Vec<Vec<f64>>>,
 }
 
 impl Spectrum {
     /// For frames like this one.
-    pub fn new(like: &LocalWidths, lengths_mm: &[f64]) -> Self {
+    pub fn new(like: &LocalWidths) -> Self {
         let n = like.widths_mm.len();
-        let basis = (1..n).flat_map(|k| cosine(k, n)).collect::<Vec<f64>>();
-        // A mean over a line's part smooths like a Gaussian of the same variance.
-        let line = like.spacing_mm * like.spacing_mm / 12.0;
-        let smoothing = (line + like.filter_mm.powi(2) + like.blur_mm.powi(2)).sqrt();
-        let expected = |length_mm: &f64| {
-            let process = Smoothed { length_mm: *length_mm, smoothing_mm: smoothing };
-            let by_lag: Vec<f64> =
-                (0..n).map(|lag| process.covariance(float(lag) * like.spacing_mm)).collect();
-            basis.chunks_exact(n).map(|wave| variance(wave, &by_lag)).collect()
-        };
-        let passed = |k: usize| {
-            let angle = PI * float(k) * like.filter_mm / (float(n) * like.spacing_mm);
-            libm::exp(-angle * angle)
-        };
-        Self {
+        let mut spectrum = Self {
             kind: Kind::of(like),
+            spacing_mm: like.spacing_mm,
+            filter_mm: like.filter_mm,
+            basis: (1..n).flat_map(|k| cosine(k, n)).collect(),
             squares: vec![0.0; n - 1],
             frames: 0.0,
             noise: 0.0,
-            passed: (1..n).map(passed).collect(),
-            expected: lengths_mm.iter().map(expected).collect(),
-            basis,
-        }
+            passed: Vec::new(),
+            expected: Vec::new(),
+        };
+        spectrum.passed = (1..n).map(|k| spectrum.left(k, like.filter_mm)).collect();
+        spectrum
+    }
+
+    /// Works out the expected squares for correlation lengths and the smallest blur \[mm\].
+    pub fn expect(&mut self, lengths_mm: &[f64], blur_mm: f64) {
+        let n = self.kind.lines;
+        let all = self.smoothing_mm(blur_mm);
+        let used = (1..n).take_while(|&k| self.left(k, all) >= MIN_LEFT).count().max(1);
+        let of = |blur: f64, length_mm: f64| {
+            let process = Smoothed { length_mm, smoothing_mm: self.smoothing_mm(blur * blur_mm) };
+            let by_lag: Vec<f64> =
+                (0..n).map(|lag| process.covariance(float(lag) * self.spacing_mm)).collect();
+            self.basis.chunks_exact(n).take(used).map(|wave| variance(wave, &by_lag)).collect()
+        };
+        let lengths = |blur: f64| lengths_mm.iter().map(|&length| of(blur, length)).collect();
+        self.expected = BLURS.into_iter().map(lengths).collect();
     }
 
     /// Whether a frame belongs to it.
@@ -105,6 +113,19 @@ impl Spectrum {
         }
         self.frames += fresh;
         self.noise += fresh * widths.noise_mm2;
+    }
+
+    /// All smoothing along the bead, as the standard deviation of a Gaussian \[mm\]. A mean
+    /// over a line's part smooths like a Gaussian of the same variance.
+    fn smoothing_mm(&self, blur_mm: f64) -> f64 {
+        let line = self.spacing_mm * self.spacing_mm / 12.0;
+        (line + self.filter_mm.powi(2) + blur_mm.powi(2)).sqrt()
+    }
+
+    /// What a Gaussian leaves of the square of a wave.
+    fn left(&self, k: usize, smoothing_mm: f64) -> f64 {
+        let angle = PI * float(k) * smoothing_mm / (float(self.kind.lines) * self.spacing_mm);
+        libm::exp(-angle * angle)
     }
 }
 
@@ -187,8 +208,11 @@ mod tests {
             filter_mm: 0.0,
             blur_mm: 0.0,
         };
-        let spectrum = Spectrum::new(&like, &[12.0]);
-        let total: f64 = spectrum.expected[0].iter().sum();
+        let mut spectrum = Spectrum::new(&like);
+        spectrum.expect(&[12.0], 0.0);
+        // All but the waves that a mean over a line leaves little of.
+        assert_eq!(spectrum.expected[3][0].len(), 29);
+        let total: f64 = spectrum.expected[3][0].iter().sum();
         // Variance of a mean over 120 mm, and of one over 4 mm.
         let of_mean = |gauge: f64| {
             let ratio = gauge / 12.0;
