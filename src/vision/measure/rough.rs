@@ -174,7 +174,10 @@ impl Work {
             return true;
         }
         let two_levels = fits.iter().all(|fit| fit.odd_share < FEW_ODD);
-        if self.is_refined { grooved } else { hidden || two_levels && self.has_gaps() }
+        // Grains here and there look like a groove in the mean over the gauge.
+        let is_covered = self.left.is_covered() || self.right.is_covered();
+        let bays = two_levels && self.has_gaps();
+        if self.is_refined { grooved } else { bays || hidden && !is_covered }
     }
 
     /// Refuses a pair that the bead's texture may have made.
