@@ -177,7 +177,11 @@ impl Work {
         // Grains here and there look like a groove in the mean over the gauge.
         let is_covered = self.left.is_covered() || self.right.is_covered();
         let bays = two_levels && self.has_gaps();
-        if self.is_refined { grooved } else { bays || hidden && !is_covered }
+        if self.is_refined {
+            grooved && (two_levels || !self.is_lost)
+        } else {
+            bays || hidden && !is_covered
+        }
     }
 
     /// Refuses a pair that the bead's texture may have made.
