@@ -266,6 +266,7 @@ impl Work {
         let found = self.measure_steps(strip, range, view, surface);
         if found.is_ok()
             && self.pattern_share > 0.0
+            && !(self.left.knows_texture() && self.right.knows_texture())
             && let Some(on_pattern) = self.measure_on_pattern(strip, range, view, surface)
         {
             return on_pattern;

@@ -261,6 +261,11 @@ impl Tracer {
         self.seen.as_ref().map(Look::blur)
     }
 
+    /// Whether the edge was located with weights that know the texture beside it.
+    pub fn knows_texture(&self) -> bool {
+        self.texture.is_some()
+    }
+
     /// What was seen of the edge.
     pub fn seen(&self) -> Option<&Look> {
         self.seen.as_ref()

@@ -138,7 +138,9 @@ impl Work {
 impl Work {
     /// Whether edges that were measured as blurred steps may be something else.
     pub(super) fn may_be_more_than_steps(&self) -> bool {
-        self.is_refined || self.is_beside_groove || self.has_gaps() || self.is_lopsided()
+        let is_step = self.left.is_clear() && self.right.is_clear();
+        let is_beside_groove = self.is_beside_groove && !is_step;
+        self.is_refined || is_beside_groove || self.has_gaps() || self.is_lopsided()
     }
 
     /// Whether places of the edges were sorted out.
