@@ -24,6 +24,8 @@ const FEW_GAPS: f64 = 0.06;
 /// the distance at which another edge is not the same \[px\].
 const LOPSIDED: f64 = 0.6;
 const ELSEWHERE_PX: f64 = 3.0;
+/// How much farther apart than blurred steps rough edges may lie \[px\].
+const WIDER_PX: f64 = 1.0;
 /// Share of odd pixels about an edge up to which it is bead and ground alone: grains
 /// and sparks have more.
 const FEW_ODD: f64 = 0.01;
@@ -157,14 +159,18 @@ impl Work {
 
     /// Whether rough edges lie elsewhere than the blurred steps.
     fn is_elsewhere(&self) -> bool {
-        let middle = |places: &[Option<Located>]| {
-            let sum: f64 = places.iter().flatten().map(|place| place.at).sum();
-            sum / float(places.iter().flatten().count().max(1))
-        };
         let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
         sides.iter().any(|(steps, rough)| {
             (middle(steps.edges()) - middle(rough.lines())).abs() > ELSEWHERE_PX
         })
+    }
+
+    /// Whether rough edges lie farther apart than the blurred steps: bays and grooves
+    /// take bead away, and what adds some is a shadow beside it.
+    fn is_wider(&self) -> bool {
+        let steps = middle(self.right.edges()) - middle(self.left.edges());
+        let rough = middle(self.rough[1].lines()) - middle(self.rough[0].lines());
+        rough > steps + WIDER_PX
     }
 
     /// Whether rough edges explain more than blurred steps do: a groove that no step
@@ -176,6 +182,9 @@ impl Work {
             return true;
         }
         let two_levels = fits.iter().all(|fit| fit.odd_share < FEW_ODD);
+        if self.is_wider() {
+            return false;
+        }
         // Grains here and there look like a groove in the mean over the gauge.
         let is_covered = self.left.is_covered() || self.right.is_covered();
         let bays = two_levels && self.has_gaps();
@@ -201,6 +210,12 @@ impl Work {
         let rival = self.pairs.iter().skip(1).find(|other| self.coarse.are_rivals(pair, other));
         rival.map_or(Ok(()), |rival| Err(self.ambiguous(pair.width_px(), rival.width_px())))
     }
+}
+
+/// Mean of places across the bead \[px\].
+fn middle(places: &[Option<Located>]) -> f64 {
+    let sum: f64 = places.iter().flatten().map(|place| place.at).sum();
+    sum / float(places.iter().flatten().count().max(1))
 }
 
 /// Whether a frame that was refused as one with smooth edges may show a rough
