@@ -149,6 +149,7 @@ impl MeanFit {
             is_narrow_groove: false,
             is_on_ground: true,
             odd_share: 0.0,
+            odd_within_share: 0.0,
             along_px: 0.0,
             lines_fraction: 1.0,
         }

@@ -272,9 +272,9 @@ impl Work {
             return on_pattern;
         }
         match found {
-            Err(reject) if may_be_rough(&reject) => {
-                self.measure_rough(strip, range, view, surface).map_err(|rough| rough.or(reject))
-            }
+            Err(reject) if may_be_rough(&reject) => self
+                .measure_rough(&reject, strip, range, view, surface)
+                .map_err(|rough| rough.or(reject)),
             Ok(found) if self.may_be_more_than_steps() => match self.find_rough(strip, range) {
                 Ok(fits) if self.explains_more(&fits) => {
                     self.take_rough(&fits, strip, view, surface)

@@ -44,6 +44,9 @@ const UNKNOWN_BLUR: Blur = Blur { px: 1.8, variance: 1.0 };
 const SAME_BLUR: f64 = 0.02;
 const FINE_FRACTION: f64 = 0.2;
 
+/// How likely a groove that does not show its depth must be to be looked at.
+const LIKELY_GROOVE: f64 = 0.25;
+
 /// What is looked at.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<'a, T> {
@@ -95,6 +98,8 @@ pub struct RoughFit {
     /// Share of the pixels about the edge that show neither the bead nor what lies
     /// outside.
     pub odd_share: f64,
+    /// The same of the bead farther inside: its texture's.
+    pub odd_within_share: f64,
     /// Standard deviation of the smoothing along the bead \[px\].
     pub along_px: f64,
     /// Fraction of the lines' variance that differs from line to line.
@@ -105,6 +110,19 @@ impl RoughEdge {
     /// Positions of the last frame, one a caliper line.
     pub fn lines(&self) -> &[Option<Located>] {
         &self.lines
+    }
+
+    /// Share of the rows that show the edge farther within the bead than a course by so
+    /// many pixels. `course` is the position across at a place along the bead \[px\].
+    pub fn share_within(&self, course: impl Fn(f64) -> f64, px: f64) -> f64 {
+        let windows = &self.windows;
+        let inwards = windows.inwards();
+        let is_within = |(row, at): (usize, &f32)| {
+            let place = windows.position(row, *at);
+            place.is_some_and(|at| inwards * (at - course(windows.middle(row))) > px)
+        };
+        let within = self.crossings.at.iter().enumerate().filter(|row| is_within(*row)).count();
+        float(within) / float(self.crossings.at.len().max(1))
     }
 
     /// Finds the edge near a line; `None` where no edge runs there.
@@ -144,7 +162,7 @@ impl RoughEdge {
         let bead_grey = mean.bead();
         let known = other.filter(|blur| blur.variance < UNKNOWN_BLUR.variance);
         let shape = known.and_then(|blur| self.fit_shape(blur)).or(self.shape);
-        let groove = shape.filter(|shape| shape.is_groove);
+        let groove = shape.filter(|shape| shape.groove_share > LIKELY_GROOVE);
         let noise = noise::of_mean(&self.windows, &self.levels, &self.crossings, scene)?;
         if let Some(groove) = groove {
             let shift = narrow(groove.at - float(OUTSIDE) - self.crossings.off_course);
@@ -164,6 +182,7 @@ impl RoughEdge {
             is_narrow_groove: groove.is_some(),
             is_on_ground: on_ground,
             odd_share: noise::mean_of(&self.crossings.odd),
+            odd_within_share: noise::mean_of(&self.crossings.odd_within),
             along_px: self.windows.along_px(),
             lines_fraction: noise.lines_fraction,
         })

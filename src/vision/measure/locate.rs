@@ -86,8 +86,10 @@ impl Work {
             }
         }
         (self.least_off_px, self.is_refined) = (LINE_OFF_PX, true);
-        let left = self.left.refine(table, &scene);
-        let right = self.right.refine(table, &right_scene);
+        // What is no blurred step does not tell how a motion blurs it.
+        let lens = self.blur_shapes.lens();
+        let left = self.left.refine(lens, &scene);
+        let right = self.right.refine(lens, &right_scene);
         if left && right { Ok(()) } else { Err(failed) }
     }
 }

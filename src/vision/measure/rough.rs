@@ -8,7 +8,7 @@ use crate::vision::number::float;
 use crate::vision::reject::Reject;
 use crate::vision::rough::{RoughFit, Scene};
 use crate::vision::strip::{Grey, Strip, View};
-use crate::vision::trace::Located;
+use crate::vision::trace::{Located, Tracer};
 use crate::vision::width::WidthMeasurement;
 
 /// The search range allows 1.5 times too wide and too narrow single places; lines
@@ -24,11 +24,19 @@ const FEW_GAPS: f64 = 0.06;
 /// the distance at which another edge is not the same \[px\].
 const LOPSIDED: f64 = 0.6;
 const ELSEWHERE_PX: f64 = 3.0;
-/// How much farther apart than blurred steps rough edges may lie \[px\].
+/// How much farther out than a blurred step a rough edge may lie \[px\].
 const WIDER_PX: f64 = 1.0;
+/// How far inside a step's course a bay reaches \[px\], and the share of the rows that
+/// must show it.
+const BAY_PX: f64 = 1.0;
+const BAYS: f64 = 0.0;
 /// Share of odd pixels about an edge up to which it is bead and ground alone: grains
 /// and sparks have more.
 const FEW_ODD: f64 = 0.01;
+/// By how much the share of odd pixels about an edge exceeds that within the bead where
+/// grains lie on it: concrete beads have up to 0.022, grains of 6 and 12 px on a third of
+/// the rows 0.027 to 0.14.
+const GRAINS: f64 = 0.024;
 /// Part of the width beside either edge where its flank may be \[of the width\]: the
 /// bead's texture is taken from between.
 const TEXTURE_MARGIN: f32 = 0.15;
@@ -38,9 +46,11 @@ const TEXTURE_MARGIN: f32 = 0.15;
 const STANDS_OUT: f64 = 5.0;
 
 impl Work {
-    /// Measures a bead by where its rows pass half height.
+    /// Measures a bead by where its rows pass half height. `refused` is why it was not
+    /// measured by blurred steps.
     pub(super) fn measure_rough<T: Grey>(
         &mut self,
+        refused: &Reject,
         strip: &Strip<'_, T>,
         range: (f32, f32),
         view: &View,
@@ -54,6 +64,9 @@ impl Work {
             }
         }
         let fits = self.fit_rough(strip, &pair)?;
+        if is_covered(refused) && fits.iter().any(has_grains) {
+            return Err(*refused);
+        }
         self.take_rough(&fits, strip, view, surface)
     }
 
@@ -140,15 +153,21 @@ impl Work {
 impl Work {
     /// Whether edges that were measured as blurred steps may be something else.
     pub(super) fn may_be_more_than_steps(&self) -> bool {
-        let is_step = self.left.is_clear() && self.right.is_clear();
-        let is_beside_groove = self.is_beside_groove && !is_step;
-        self.is_refined || is_beside_groove || self.has_gaps() || self.is_lopsided()
+        self.is_refined || self.is_beside_groove || self.has_gaps() || self.is_lopsided()
     }
 
     /// Whether places of the edges were sorted out.
     fn has_gaps(&self) -> bool {
-        let used_share = self.left.used_share().min(self.right.used_share());
-        used_share < 1.0 - FEW_GAPS
+        has_gaps(&self.left) || has_gaps(&self.right)
+    }
+
+    /// Whether rough edges lie farther inside on some rows of an edge of which places were
+    /// sorted out: ground shows there.
+    fn has_bays(&self) -> bool {
+        let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
+        sides.iter().any(|(steps, rough)| {
+            has_gaps(steps) && rough.share_within(|v| steps.expected_at(v).into(), BAY_PX) > BAYS
+        })
     }
 
     /// Whether one edge is much fainter than the other, as a rib's is.
@@ -165,32 +184,37 @@ impl Work {
         })
     }
 
-    /// Whether rough edges lie farther apart than the blurred steps: bays and grooves
-    /// take bead away, and what adds some is a shadow beside it.
-    fn is_wider(&self) -> bool {
-        let steps = middle(self.right.edges()) - middle(self.left.edges());
-        let rough = middle(self.rough[1].lines()) - middle(self.rough[0].lines());
-        rough > steps + WIDER_PX
+    /// Whether a rough edge lies farther out than its blurred step, with no narrow
+    /// groove in between: bays take bead away, and what adds some is a shadow beside it.
+    fn is_wider(&self, fits: &[RoughFit; 2]) -> bool {
+        let sides = [(&self.left, &self.rough[0], -1.0), (&self.right, &self.rough[1], 1.0)];
+        sides.iter().zip(fits).any(|((steps, rough, outwards), fit)| {
+            let out = outwards * (middle(rough.lines()) - middle(steps.edges()));
+            !fit.is_narrow_groove && out > WIDER_PX
+        })
     }
 
     /// Whether rough edges explain more than blurred steps do: a groove that no step
     /// is, or bays in an edge that were sorted out as grains.
     pub(super) fn explains_more(&self, fits: &[RoughFit; 2]) -> bool {
-        let hidden = fits.iter().any(|fit| fit.is_narrow_groove);
-        let grooved = hidden || fits.iter().any(|fit| fit.is_groove);
         if self.is_lopsided() && self.is_elsewhere() {
             return true;
         }
-        let two_levels = fits.iter().all(|fit| fit.odd_share < FEW_ODD);
-        if self.is_wider() {
+        if self.is_wider(fits) {
             return false;
         }
-        // Grains here and there look like a groove in the mean over the gauge.
-        let is_covered = self.left.is_covered() || self.right.is_covered();
-        let bays = two_levels && self.has_gaps();
+        let two_levels = are_two_levels(fits);
+        // Texture that is known on both sides looks like a groove here and there.
+        let knows_texture = self.left.knows_texture() && self.right.knows_texture();
+        let hidden = !knows_texture && fits.iter().any(|fit| fit.is_narrow_groove);
         if self.is_refined {
-            grooved && (two_levels || !self.is_lost)
+            let has_grains = fits.iter().any(has_grains);
+            let grooved = hidden || fits.iter().any(|fit| fit.is_groove);
+            grooved && !has_grains && (two_levels || !self.is_lost)
         } else {
+            // Grains here and there look like a groove in the mean over the gauge.
+            let is_covered = self.left.is_covered() || self.right.is_covered();
+            let bays = two_levels && self.has_bays();
             bays || hidden && !is_covered
         }
     }
@@ -210,6 +234,26 @@ impl Work {
         let rival = self.pairs.iter().skip(1).find(|other| self.coarse.are_rivals(pair, other));
         rival.map_or(Ok(()), |rival| Err(self.ambiguous(pair.width_px(), rival.width_px())))
     }
+}
+
+/// Whether edges show bead and what lies outside, and no grains.
+fn are_two_levels(fits: &[RoughFit; 2]) -> bool {
+    fits.iter().all(|fit| fit.odd_share < FEW_ODD)
+}
+
+/// Whether more shows about an edge than bead with its texture and ground.
+fn has_grains(fit: &RoughFit) -> bool {
+    fit.odd_share > fit.odd_within_share + GRAINS
+}
+
+/// Whether a frame was refused for what hides its edges, which may be grains.
+fn is_covered(refused: &Reject) -> bool {
+    matches!(refused, Reject::Scattered { .. } | Reject::Occluded { .. } | Reject::NoPair { .. })
+}
+
+/// Whether places of an edge were sorted out.
+fn has_gaps(steps: &Tracer) -> bool {
+    steps.used_share() < 1.0 - FEW_GAPS
 }
 
 /// Mean of places across the bead \[px\].

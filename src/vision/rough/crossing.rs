@@ -14,6 +14,8 @@ const DEEPEST_PX: f32 = 25.0;
 const FRACTIONS: (f32, f32) = (-1.0, 2.0);
 /// Fractions beyond which a pixel shows something else than the two.
 const ODD: (f32, f32) = (-0.2, 1.2);
+/// How much farther inside a grain on the edge may reach \[px\].
+const GRAIN_PX: usize = 8;
 /// Fraction of the bead that a pixel inside the edge must show.
 const BEAD: f32 = 0.5;
 /// The length of a Gaussian flank from a fifth to four fifths of its height,
@@ -27,9 +29,11 @@ pub struct Crossing {
     pub at: f32,
     /// Length of the flank \[px\], from a fifth to four fifths of its height.
     pub flank: f32,
-    /// Share of the pixels that are clearly darker than what lies outside or brighter
-    /// than the bead: of something else.
+    /// Share of the pixels about the edge that are clearly darker than what lies outside
+    /// or brighter than the bead.
     pub odd: f32,
+    /// The same of the bead farther inside.
+    pub odd_within: f32,
 }
 
 /// Levels about a row.
@@ -43,6 +47,8 @@ pub struct Flank {
     pub inside: f32,
     /// Course of the edge \[px\].
     pub course: f32,
+    /// Bead beyond the course that shows what its texture is \[px\].
+    pub within_px: f32,
 }
 
 /// The edge by the area of the bead: the place from which on the row would hold as
@@ -62,16 +68,27 @@ pub fn of(row: &Row, flank: &Flank) -> Option<Crossing> {
             return None;
         }
     }
-    let (mut sum, mut mixed, mut odd) = (0.0, 0.0, 0.0);
+    let (mut sum, mut mixed) = (0.0, 0.0);
     for value in &row[first..=last] {
         let fraction = (value - flank.outside) * scale;
         let shown = fraction.clamp(0.0, 1.0);
         sum += fraction.clamp(FRACTIONS.0, FRACTIONS.1);
         mixed += shown * (1.0 - shown);
-        odd += f32::from(u8::from(fraction < ODD.0 || fraction > ODD.1));
     }
-    let odd = odd / single(last + 1 - first);
-    Some(Crossing { at: single(last) + 0.5 - sum, flank: FLANK * mixed, odd })
+    let end = whole(flank.course + flank.within_px).min(SPAN);
+    let within = (last + GRAIN_PX).min(end)..end;
+    let (odd, odd_within) = (odd_share(&row[first..=last], flank), odd_share(&row[within], flank));
+    Some(Crossing { at: single(last) + 0.5 - sum, flank: FLANK * mixed, odd, odd_within })
+}
+
+/// Share of pixels that show neither the bead nor what lies outside.
+#[inline(always)]
+fn odd_share(pixels: &[f32], flank: &Flank) -> f32 {
+    let scale = 1.0 / (flank.inside - flank.outside);
+    let fraction = |value: &f32| (value - flank.outside) * scale;
+    let is_odd = |fraction: f32| fraction < ODD.0 || fraction > ODD.1;
+    let odd: f32 = pixels.iter().map(|value| f32::from(u8::from(is_odd(fraction(value))))).sum();
+    odd / single(pixels.len().max(1))
 }
 
 #[cfg(test)]
@@ -82,7 +99,8 @@ mod tests {
         std::array::from_fn(|k| of(single(k)))
     }
 
-    const FLANK: Flank = Flank { start: 40.0, outside: 20.0, inside: 120.0, course: 58.0 };
+    const FLANK: Flank =
+        Flank { start: 40.0, outside: 20.0, inside: 120.0, course: 58.0, within_px: 30.0 };
 
     #[test]
     fn a_ramp_is_passed_in_its_middle() {
@@ -105,6 +123,19 @@ mod tests {
         let torn = row(|u| if u < 70.0 { 20.0 } else { 120.0 });
         let found = of(&torn, &FLANK).unwrap();
         assert!((found.at - 69.5).abs() < 1e-3, "{found:?}");
+    }
+
+    #[test]
+    fn a_spark_at_the_edge_is_odd_and_texture_all_over_the_bead_is_not() {
+        let step = |u: f32| if u < 58.0 { 20.0 } else { 120.0 };
+        let texture = |u: f32| if whole(u).is_multiple_of(3) { 40.0 } else { 0.0 };
+        let odd = |of: &dyn Fn(f32) -> f32| {
+            let found = super::of(&row(of), &FLANK).unwrap();
+            found.odd - found.odd_within
+        };
+        assert!(odd(&step).abs() < 1e-6);
+        assert!(odd(&|u| if (50.0..54.0).contains(&u) { -60.0 } else { step(u) }) > 0.1);
+        assert!(odd(&|u| step(u) + texture(u)) < 0.1);
     }
 
     #[test]

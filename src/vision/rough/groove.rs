@@ -41,12 +41,15 @@ const BLUR_PX: (f64, f64) = (0.6, 6.0);
 const HELD: f64 = 1e9;
 /// Places at the far end of ground that may be those of a groove's far side \[px\].
 const FAR_END_PX: usize = 4;
-/// By how much the sum of squares must fall for a dark line beside an edge on ground: four
-/// standard deviations. A wider one than that is ground.
-const DIP_COST: f64 = 16.0;
+/// By how much the sum of squares must fall until a dark line beside an edge on ground is
+/// as likely as none. A wider one than that is ground.
+const DIP_COST: f64 = 6.0;
 const WIDEST_DIP_PX: f64 = 9.0;
 /// Unknowns of the fit.
-const UNKNOWNS: usize = 7;
+const UNKNOWNS: usize = 8;
+/// Standard deviation of the slope of what lies beyond, from place to place, as a fraction
+/// of the bead's level: light, a film of water, an older layer.
+const BEYOND_SLOPE: f64 = 0.01;
 
 /// Shape of an edge in the mean over its rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,10 +58,25 @@ pub struct EdgeShape {
     pub at: f64,
     /// Its variance \[px²\].
     pub variance: f64,
-    /// Whether a groove lies beside it that does not show how dark it is.
-    pub is_groove: bool,
+    /// How likely it is that a groove lies beside it that does not show how dark it is.
+    pub groove_share: f64,
     /// Blur of the bead's edge.
     pub blur: Blur,
+}
+
+impl EdgeShape {
+    /// Likeliest value of one shape or another one, the latter so likely, and the
+    /// variance of both (Bayesian model averaging).
+    fn or(&self, other: &Self, share: f64) -> Self {
+        let apart = other.at - self.at;
+        let mean = |one: f64, other: f64| one + share * (other - one);
+        Self {
+            at: mean(self.at, other.at),
+            variance: mean(self.variance, other.variance) + share * (1.0 - share) * apart * apart,
+            groove_share: mean(self.groove_share, other.groove_share),
+            blur: if share > 0.5 { other.blur } else { self.blur },
+        }
+    }
 }
 
 /// Blur of an edge in the mean over its rows, lens and what is too fine to be followed.
@@ -95,12 +113,19 @@ struct Model {
     /// Variance by which the far side is more blurred: it does not follow the near one
     /// \[px²\].
     apart: f64,
+    /// Slope of what lies beyond, outwards \[grey levels/px\].
+    slope: f64,
 }
 
 impl Model {
+    /// Whether it is a narrow line that is darker than what lies beyond.
+    fn is_dip(&self) -> bool {
+        self.width < WIDEST_DIP_PX && self.grey < self.beyond
+    }
+
     /// The unknowns in the order of the derivatives.
     fn unknowns(&self) -> [f64; UNKNOWNS] {
-        [self.at, self.width, self.blur, self.beyond, self.grey, self.bead, self.apart]
+        [self.at, self.width, self.blur, self.beyond, self.grey, self.bead, self.apart, self.slope]
     }
 
     /// The model after a step, within the ranges of its unknowns.
@@ -114,25 +139,30 @@ impl Model {
             grey: (self.grey + step[4]).clamp(0.0, bead),
             bead: self.bead + step[5],
             apart: (self.apart + step[6]).clamp(0.0, MAX_APART_PX2),
+            slope: self.slope + step[7],
         }
     }
 
     /// Value at a place, and its derivatives by position, width, blur, level beyond,
-    /// level in the groove, level of the bead, and the far side's variance.
+    /// level in the groove, level of the bead, the far side's variance, and slope.
     fn value(&self, place: f64) -> (f64, [f64; UNKNOWNS]) {
         let far_blur = (self.blur * self.blur + self.apart).sqrt();
         let near = Edge::of(place - self.at, self.blur);
         let far = Edge::of(place - self.at + self.width, far_blur);
         let (up, down) = (self.bead - self.grey, self.beyond - self.grey);
-        let value = self.beyond - down * far.share + up * near.share;
+        let (outside, away) = (1.0 - near.share, self.at - place);
+        let shade = self.slope * away;
+        let value = self.beyond - down * far.share + up * near.share + shade * outside;
+        let of_near = up - shade;
         let row = [
-            down * far.slope - up * near.slope,
+            down * far.slope - of_near * near.slope + self.slope * outside,
             -down * far.slope,
-            -down * far.by_blur * self.blur / far_blur + up * near.by_blur,
+            -down * far.by_blur * self.blur / far_blur + of_near * near.by_blur,
             1.0 - far.share,
             far.share - near.share,
             near.share,
             -down * far.by_blur * 0.5 / far_blur,
+            away * outside,
         ];
         (value, row)
     }
@@ -195,6 +225,7 @@ pub fn fit(mean: &MeanProfile, known: &Known) -> Option<EdgeShape> {
         grey: GREY * bead,
         bead,
         apart: 0.0,
+        slope: 0.0,
     };
     let sigmas = [
         f64::INFINITY,
@@ -204,24 +235,31 @@ pub fn fit(mean: &MeanProfile, known: &Known) -> Option<EdgeShape> {
         GREY_SIGMA * bead,
         BEAD_SIGMA * bead,
         known.roughness + APART_PX2,
+        if mean.on_ground { BEYOND_SLOPE * bead } else { BEYOND_SLOPE * APART_PX2 },
     ];
     let weight = 1.0 / (known.variance + (MISFIT * bead).powi(2));
     let groove = Problem { mean, places: (first, last), weight, prior: narrow, sigmas };
     let from_narrow = groove.descend(narrow);
     if mean.on_ground {
         let step = Model { width: WIDTH_PX.1, grey: narrow.beyond, ..narrow };
-        let sigmas = [sigmas[0], APART_PX2, sigmas[2], sigmas[3], bead, sigmas[5], APART_PX2];
+        let sigmas =
+            [sigmas[0], APART_PX2, sigmas[2], sigmas[3], bead, sigmas[5], APART_PX2, sigmas[7]];
         let step = Problem { prior: step, sigmas, ..groove }.descend(step)?;
-        let dip = from_narrow
-            .filter(|dip| dip.cost + DIP_COST < step.cost && dip.model.width < WIDEST_DIP_PX);
-        return dip.map_or_else(|| groove.judge(&step, false), |dip| groove.judge(&dip, true));
+        let dip = from_narrow.filter(|dip| dip.model.is_dip());
+        let step_shape = groove.judge(&step, 0.0);
+        let Some(dip) = dip else { return step_shape };
+        let share = 1.0 / (1.0 + libm::exp(0.5 * (DIP_COST + dip.cost - step.cost)));
+        return match (step_shape, groove.judge(&dip, 1.0)) {
+            (Some(step), Some(dip)) => Some(step.or(&dip, share)),
+            (step, dip) => dip.or(step),
+        };
     }
     let missing: f64 = (mean.darkest()..last).map(|k| bead - f64::from(mean.grey[k])).sum();
     let width = (2.0 * missing / (bead - narrow.grey)).clamp(NARROW_PX, 0.5 * WIDTH_PX.1);
     let from_wide = groove.descend(Model { width, ..narrow });
     let fitted = [from_narrow, from_wide].into_iter().flatten();
     let best = fitted.min_by(|one, other| one.cost.total_cmp(&other.cost))?;
-    groove.judge(&best, true)
+    groove.judge(&best, 1.0)
 }
 
 /// Brightest level from a place on up to the darkest one \[grey levels\].
@@ -258,27 +296,35 @@ impl Problem<'_> {
         Some(Fitted { model: *model, squares, cost: squares + held, solved })
     }
 
-    /// The least squares from a start on.
-    fn descend(&self, mut model: Model) -> Option<Fitted> {
+    /// The least squares from a start on: Gauss–Newton, with steps that are halved until
+    /// they descend.
+    fn descend(&self, start: Model) -> Option<Fitted> {
+        let mut best = self.solve(&start)?;
+        let mut share = 1.0;
         for _ in 0..ROUNDS {
-            let fitted = self.solve(&model)?;
-            let step = fitted.solved.unknowns;
+            let step = share * best.solved.unknowns;
             if step[0].abs() < CONVERGED_PX && step[1].abs() < CONVERGED_WIDTH_PX {
-                return Some(fitted);
+                break;
             }
-            model = model.after(&step, self.prior.bead);
+            let next = self.solve(&best.model.after(&step, self.prior.bead))?;
+            if next.cost < best.cost {
+                best = next;
+                share = f64::min(2.0 * share, 1.0);
+            } else {
+                share *= 0.5;
+            }
         }
-        None
+        Some(best)
     }
 
     /// What a fit says, if it fits.
-    fn judge(&self, fitted: &Fitted, is_groove: bool) -> Option<EdgeShape> {
+    fn judge(&self, fitted: &Fitted, groove_share: f64) -> Option<EdgeShape> {
         let (model, solved) = (&fitted.model, &fitted.solved);
         let freedom = float((self.places.1 - self.places.0).saturating_sub(UNKNOWNS).max(1));
         let misfit = fitted.squares / freedom;
         let inflation = misfit.max(1.0);
         let blur = Blur { px: model.blur, variance: solved.variance(2) * inflation };
         let variance = solved.variance(0) * inflation;
-        (misfit < MAX_MISFIT).then_some(EdgeShape { at: model.at, variance, is_groove, blur })
+        (misfit < MAX_MISFIT).then_some(EdgeShape { at: model.at, variance, groove_share, blur })
     }
 }

@@ -82,8 +82,10 @@ pub struct Crossings {
     pub flank: Vec<f32>,
     /// Distance of the edge from where what lies outside ends, likewise.
     pub gap: Vec<f32>,
-    /// Share of odd pixels, likewise.
+    /// Share of odd pixels, likewise, and the same of the bead farther inside.
     pub odd: Vec<f32>,
+    /// See `odd`.
+    pub odd_within: Vec<f32>,
     /// Mean distance of the edge from the course, rounded to pixels \[px\].
     pub off_course: f64,
 }
@@ -225,9 +227,11 @@ impl Levels {
         out.flank.clear();
         out.gap.clear();
         out.odd.clear();
+        out.odd_within.clear();
         let (mut sum, mut seen) = (0.0, 0.0);
         let ground =
             self.mean.filter(|mean| mean.on_ground).map(|mean| mean.outside.1 - GROUND_PX / 2);
+        let within_px = self.mean.map_or(0.0, |mean| single(mean.inside.1 - OUTSIDE));
         for (number, (row, &at)) in windows.all().iter().zip(course).enumerate() {
             let levels = self.between(number);
             let start = ground.unwrap_or(levels.darkest);
@@ -236,11 +240,13 @@ impl Levels {
                 outside: levels.outside - self.hidden_depth(&levels),
                 inside: levels.inside,
                 course: at,
+                within_px,
             };
             let found = crossing::of(row, &flank);
             out.at.push(found.map_or(f32::NAN, |found| found.at));
             out.flank.push(found.map_or(f32::NAN, |found| found.flank));
             out.odd.push(found.map_or(f32::NAN, |found| found.odd));
+            out.odd_within.push(found.map_or(f32::NAN, |found| found.odd_within));
             out.gap.push(found.map_or(f32::NAN, |found| found.at - flank.start));
             if let Some(found) = found {
                 sum += f64::from(found.at - at.max(0.0).round());
