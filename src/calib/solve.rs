@@ -97,7 +97,7 @@ pub struct Solution {
     /// fit leaves.
     pub noise_px: f64,
     /// How many times larger the numbers' variances are than if every corner were off by
-    /// itself; see [`pull::design_effect`].
+    /// itself.
     pub design_effect: f64,
     /// All that was tried.
     pub trials: Vec<Trial>,

@@ -47,6 +47,11 @@ const FINE_FRACTION: f64 = 0.2;
 /// How likely a groove that does not show its depth must be to be looked at.
 const LIKELY_GROOVE: f64 = 0.25;
 
+/// Difference of the bead's level beside the edge from that farther inside, in standard
+/// deviations of what light does, from which on the former is taken, and the standard
+/// deviation of the shift that this makes, as a fraction of it.
+const LEVEL_OFF: f64 = 1.0;
+const SHIFT_FRACTION: f64 = 0.2;
 /// What is looked at.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<'a, T> {
@@ -112,19 +117,6 @@ impl RoughEdge {
         &self.lines
     }
 
-    /// Share of the rows that show the edge farther within the bead than a course by so
-    /// many pixels. `course` is the position across at a place along the bead \[px\].
-    pub fn share_within(&self, course: impl Fn(f64) -> f64, px: f64) -> f64 {
-        let windows = &self.windows;
-        let inwards = windows.inwards();
-        let is_within = |(row, at): (usize, &f32)| {
-            let place = windows.position(row, *at);
-            place.is_some_and(|at| inwards * (at - course(windows.middle(row))) > px)
-        };
-        let within = self.crossings.at.iter().enumerate().filter(|row| is_within(*row)).count();
-        float(within) / float(self.crossings.at.len().max(1))
-    }
-
     /// Finds the edge near a line; `None` where no edge runs there.
     #[inline(always)]
     pub fn find<T: Grey>(&mut self, scene: &Scene<'_, T>, line: &StepLine) -> Option<()> {
@@ -164,16 +156,23 @@ impl RoughEdge {
         let shape = known.and_then(|blur| self.fit_shape(blur)).or(self.shape);
         let groove = shape.filter(|shape| shape.groove_share > LIKELY_GROOVE);
         let noise = noise::of_mean(&self.windows, &self.levels, &self.crossings, scene)?;
-        if let Some(groove) = groove {
-            let shift = narrow(groove.at - float(OUTSIDE) - self.crossings.off_course);
-            for at in &mut self.crossings.at {
-                *at += shift;
-            }
+        // Where a rib or a shade lies within, only the level beside the edge is the bead's.
+        let shaped = shape.filter(|shape| shape.level_off > LEVEL_OFF).or(groove);
+        let shift =
+            shaped.map_or(0.0, |shape| shape.at - float(OUTSIDE) - self.crossings.off_course);
+        for at in &mut self.crossings.at {
+            *at += narrow(shift);
         }
+        let of_shape = |shape: EdgeShape| {
+            if groove.is_some() {
+                return shape.variance;
+            }
+            shape.variance.max(noise.of_mean) + (SHIFT_FRACTION * shift).powi(2)
+        };
         self.gather(scene, noise.of_row);
         let seen = self.crossings.at.iter().filter(|at| at.is_finite()).count();
         Some(RoughFit {
-            variance: groove.map_or(noise.of_mean, |groove| groove.variance),
+            variance: shaped.map_or(noise.of_mean, of_shape),
             rows_fraction: float(seen) / float(self.crossings.at.len()),
             contrast: self.levels.contrast(),
             blur_px: noise.blur_px,

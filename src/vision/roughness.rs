@@ -3,7 +3,7 @@
 //! Roughness is the standard deviation of the local width along the bead, about the
 //! bead's own mean; its correlation length is that of exp(−|d|/length). One gauge is too
 //! short for both: what counts is the length of bead that has been seen. Each frame adds
-//! the squares of its cosine coefficients to a [`Spectrum`]; the estimate is the mean over
+//! the squares of its cosine coefficients to a spectrum; the estimate is the mean over
 //! the likelihood of roughness and length, given the calipers' noise and all smoothing
 //! along the bead.
 //!

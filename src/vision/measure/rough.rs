@@ -1,5 +1,6 @@
 //! Beads whose edges are no blurred steps: torn ones, grooves, texture.
 
+use super::patterned::STRONGEST;
 use super::{NEED_SHARE, Work, even};
 use crate::calib::SurfaceMap;
 use crate::vision::coarse::LinePair;
@@ -24,12 +25,14 @@ const FEW_GAPS: f64 = 0.06;
 /// the distance at which another edge is not the same \[px\].
 const LOPSIDED: f64 = 0.6;
 const ELSEWHERE_PX: f64 = 3.0;
+/// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a
+/// wide flank.
+const PART_OF_FLANK: f64 = 0.5;
 /// How much farther out than a blurred step a rough edge may lie \[px\].
 const WIDER_PX: f64 = 1.0;
-/// How far inside a step's course a bay reaches \[px\], and the share of the rows that
-/// must show it.
-const BAY_PX: f64 = 1.0;
-const BAYS: f64 = 0.0;
+/// Contrast of a rough edge over that of the blurred step from which on it is higher: by
+/// sparks on 5 % of the bead it is 1.05 to 1.1.
+const HIGHER: f64 = 1.04;
 /// Share of odd pixels about an edge up to which it is bead and ground alone: grains
 /// and sparks have more.
 const FEW_ODD: f64 = 0.01;
@@ -57,7 +60,8 @@ impl Work {
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
         let pair = self.find_lines(strip, range)?;
-        if let Some(pattern) = self.ground_pattern(strip, &pair) {
+        let pattern = self.ground_pattern(strip, &pair);
+        if let Some(pattern) = pattern {
             let found = self.measure_patterned((&pair, pattern), strip, view, surface);
             if !matches!(found, Err(Reject::NoPair { .. })) {
                 return found;
@@ -67,6 +71,7 @@ impl Work {
         if is_covered(refused) && fits.iter().any(has_grains) {
             return Err(*refused);
         }
+        check_pattern(pattern.unwrap_or(0.0), &fits)?;
         self.take_rough(&fits, strip, view, surface)
     }
 
@@ -161,13 +166,18 @@ impl Work {
         has_gaps(&self.left) || has_gaps(&self.right)
     }
 
-    /// Whether rough edges lie farther inside on some rows of an edge of which places were
-    /// sorted out: ground shows there.
-    fn has_bays(&self) -> bool {
-        let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
-        sides.iter().any(|(steps, rough)| {
-            has_gaps(steps) && rough.share_within(|v| steps.expected_at(v).into(), BAY_PX) > BAYS
-        })
+    /// Whether rough edges are not higher than the blurred steps: then what was sorted
+    /// out shows ground. Dark grains beside an edge, sparks within and shading make rough
+    /// edges higher; holes within make them lower.
+    fn is_no_higher(&self, fits: &[RoughFit; 2]) -> bool {
+        fits.iter().zip(self.contrasts).all(|(fit, step)| fit.contrast < HIGHER * step)
+    }
+
+    /// Whether the blurred steps are parts of flanks that are wider than any blur.
+    fn are_parts_of_flanks(&self, fits: &[RoughFit; 2]) -> bool {
+        let mut sides = fits.iter().zip(self.contrasts);
+        let is_wide = self.is_refined && fits.iter().any(|fit| fit.blur_px > WIDEST_ROUGH_PX);
+        is_wide || sides.all(|(fit, step)| step < PART_OF_FLANK * fit.contrast)
     }
 
     /// Whether one edge is much fainter than the other, as a rib's is.
@@ -197,7 +207,7 @@ impl Work {
     /// Whether rough edges explain more than blurred steps do: a groove that no step
     /// is, or bays in an edge that were sorted out as grains.
     pub(super) fn explains_more(&self, fits: &[RoughFit; 2]) -> bool {
-        if self.is_lopsided() && self.is_elsewhere() {
+        if self.is_lopsided() && self.is_elsewhere() || self.are_parts_of_flanks(fits) {
             return true;
         }
         if self.is_wider(fits) {
@@ -214,7 +224,7 @@ impl Work {
         } else {
             // Grains here and there look like a groove in the mean over the gauge.
             let is_covered = self.left.is_covered() || self.right.is_covered();
-            let bays = two_levels && self.has_bays();
+            let bays = two_levels && self.has_gaps() && self.is_no_higher(fits);
             bays || hidden && !is_covered
         }
     }
@@ -239,6 +249,15 @@ impl Work {
 /// Whether edges show bead and what lies outside, and no grains.
 fn are_two_levels(fits: &[RoughFit; 2]) -> bool {
     fits.iter().all(|fit| fit.odd_share < FEW_ODD)
+}
+
+/// Refuses a bead on ground whose pattern is as strong as its edges. `pattern` is its
+/// standard deviation \[grey levels\]; beside a groove it is another bead's.
+fn check_pattern(pattern: f64, fits: &[RoughFit; 2]) -> Result<(), Reject> {
+    let is_on_ground = fits.iter().all(|fit| fit.is_on_ground && !fit.is_groove);
+    let got = pattern / fits[0].contrast.min(fits[1].contrast);
+    let limit = STRONGEST;
+    if is_on_ground && got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
 }
 
 /// Whether more shows about an edge than bead with its texture and ground.

@@ -62,6 +62,9 @@ pub struct EdgeShape {
     pub groove_share: f64,
     /// Blur of the bead's edge.
     pub blur: Blur,
+    /// How much the bead's level beside the edge differs from that farther inside, in
+    /// standard deviations of what light does.
+    pub level_off: f64,
 }
 
 impl EdgeShape {
@@ -75,6 +78,7 @@ impl EdgeShape {
             variance: mean(self.variance, other.variance) + share * (1.0 - share) * apart * apart,
             groove_share: mean(self.groove_share, other.groove_share),
             blur: if share > 0.5 { other.blur } else { self.blur },
+            level_off: mean(self.level_off, other.level_off),
         }
     }
 }
@@ -325,6 +329,8 @@ impl Problem<'_> {
         let inflation = misfit.max(1.0);
         let blur = Blur { px: model.blur, variance: solved.variance(2) * inflation };
         let variance = solved.variance(0) * inflation;
-        (misfit < MAX_MISFIT).then_some(EdgeShape { at: model.at, variance, groove_share, blur })
+        let level_off = (model.bead - self.prior.bead).abs() / self.sigmas[5];
+        let shape = EdgeShape { at: model.at, variance, groove_share, blur, level_off };
+        (misfit < MAX_MISFIT).then_some(shape)
     }
 }

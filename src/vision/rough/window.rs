@@ -53,11 +53,6 @@ impl Windows {
         self.sheet.windows()[number].line
     }
 
-    /// Middle of a row along the bead \[px\].
-    pub fn middle(&self, number: usize) -> f64 {
-        self.sheet.windows()[number].middle.into()
-    }
-
     /// Rows of the gauge that a row is the mean of.
     pub fn rows(&self, number: usize) -> f64 {
         self.sheet.windows()[number].rows.into()
@@ -73,11 +68,6 @@ impl Windows {
         let last = narrow(float(SPAN - 1));
         let at = if self.bead_after { first + at } else { first + last - at };
         (0.0..=self.width - 1.0).contains(&at).then(|| at.into())
-    }
-
-    /// Sign of the direction across from the edge into the bead.
-    pub fn inwards(&self) -> f64 {
-        if self.bead_after { 1.0 } else { -1.0 }
     }
 
     /// Sum of the squares of the smoothing's weights across.
