@@ -36,6 +36,11 @@ impl BlurShapes {
         &self.tables[0]
     }
 
+    /// Whether it has the box of a motion.
+    pub fn is_motion(&self) -> bool {
+        self.chosen > 0
+    }
+
     /// Goes back to a lens's blur.
     pub fn reset(&mut self) {
         self.chosen = 0;

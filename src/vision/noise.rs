@@ -18,6 +18,15 @@ const KEPT_VARIANCE: f32 = 0.976;
 /// Rounding to whole levels is noise too.
 const LEAST: f32 = 0.2887;
 
+/// Noise up to which it is not told from rounding, as a multiple of that.
+const HARDLY: f32 = 1.2;
+
+/// Whether a noise \[grey levels of 256\] is hardly more than rounding: a compression or
+/// the camera took it away, and what it left in its place is not that of neighbours.
+pub fn is_taken_away<T: Grey>(noise: f32, strip: &Strip<'_, T>) -> bool {
+    noise < HARDLY * LEAST * strip.level_step
+}
+
 /// Standard deviation of a pixel in some columns \[grey levels of 256\].
 #[inline(always)]
 pub fn of<T: Grey>(strip: &Strip<'_, T>, columns: Range<usize>) -> f32 {

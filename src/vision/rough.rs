@@ -23,7 +23,7 @@ mod window;
 use super::coarse::StepLine;
 use super::number::{float, narrow};
 use super::strip::{Grey, Strip};
-use super::trace::Located;
+use super::trace::{self, Located};
 pub use groove::Blur;
 use groove::EdgeShape;
 use levels::{Crossings, Levels, OUTSIDE};
@@ -115,6 +115,11 @@ impl RoughEdge {
     /// Positions of the last frame, one a caliper line.
     pub fn lines(&self) -> &[Option<Located>] {
         &self.lines
+    }
+
+    /// Mean of the positions across the bead \[px\].
+    pub fn middle(&self) -> f64 {
+        trace::middle(&self.lines)
     }
 
     /// Finds the edge near a line; `None` where no edge runs there.

@@ -11,6 +11,7 @@ mod uncover;
 mod winding;
 
 use super::cut_off::CutOff;
+use super::noise;
 use super::number::{float, narrow};
 use super::overlay::{Extent, Look, Overlay, REACH, Shape, Step};
 use super::path::{self, Course};
@@ -183,6 +184,11 @@ impl Tracer {
         used / float(self.edges.len().max(1))
     }
 
+    /// Mean of the edges' places across the bead \[px\].
+    pub fn middle(&self) -> f64 {
+        middle(&self.edges)
+    }
+
     /// The edges, for those who sort out outliers.
     pub fn edges_mut(&mut self) -> &mut [Option<Located>] {
         &mut self.edges
@@ -331,12 +337,14 @@ impl Tracer {
         let Some(seen) = &self.seen else { return false };
         let Some(shape) = self.overlay.shape(table, seen, blur) else { return false };
         let aside = shape.step.at;
+        let is_bare = noise::is_taken_away(scene.noise, scene.strip);
+        let of_misfit = if is_bare { seen.variance_of_misfit() } else { 0.0 };
         let shape = self.adopt(shape);
         if aside.abs() > FAR_ASIDE_PX {
             self.read(scene);
         }
         self.blur_px = shape.step.blur;
-        self.common_variance = shape.variance;
+        self.common_variance = shape.variance + of_misfit;
         self.tabulate(table, &shape);
         for _ in 0..MAX_PASSES {
             self.hold(scene);
@@ -480,6 +488,12 @@ impl Tracer {
         self.course.redraw(scene.lines, &self.rough, &mut self.memory);
         self.read(scene);
     }
+}
+
+/// Mean of places across the bead \[px\].
+pub fn middle(places: &[Option<Located>]) -> f64 {
+    let sum: f64 = places.iter().flatten().map(|place| place.at).sum();
+    sum / float(places.iter().flatten().count().max(1))
 }
 
 fn typical(values: &[f32]) -> f32 {

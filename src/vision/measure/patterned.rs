@@ -10,7 +10,7 @@ use crate::vision::width::WidthMeasurement;
 
 /// Strongest pattern of the ground, as a fraction of the contrast: one of a third is
 /// measured, of a stronger one parts are taken for the bead.
-pub(super) const STRONGEST: f64 = 0.37;
+const STRONGEST: f64 = 0.37;
 /// Weakest pattern, as a fraction of the contrast, beside which blurred steps are not
 /// good enough: one of less draws them outwards by hardly 0.02 px.
 const NOTABLE: f64 = 0.06;

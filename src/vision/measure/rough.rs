@@ -1,15 +1,13 @@
 //! Beads whose edges are no blurred steps: torn ones, grooves, texture.
 
-use super::patterned::STRONGEST;
 use super::{NEED_SHARE, Work, even};
 use crate::calib::SurfaceMap;
 use crate::vision::coarse::LinePair;
 use crate::vision::gauge::Polarity;
-use crate::vision::number::float;
 use crate::vision::reject::Reject;
 use crate::vision::rough::{RoughFit, Scene};
 use crate::vision::strip::{Grey, Strip, View};
-use crate::vision::trace::{Located, Tracer};
+use crate::vision::trace::Tracer;
 use crate::vision::width::WidthMeasurement;
 
 /// The search range allows 1.5 times too wide and too narrow single places; lines
@@ -40,6 +38,9 @@ const FEW_ODD: f64 = 0.01;
 /// grains lie on it: concrete beads have up to 0.022, grains of 6 and 12 px on a third of
 /// the rows 0.027 to 0.14.
 const GRAINS: f64 = 0.024;
+/// Strongest pattern beside rough edges, as a fraction of the contrast: beside beads of
+/// real concrete, other beads and grooves have up to 0.464.
+const STRONGEST_BESIDE_ROUGH: f64 = 0.48;
 /// Part of the width beside either edge where its flank may be \[of the width\]: the
 /// bead's texture is taken from between.
 const TEXTURE_MARGIN: f32 = 0.15;
@@ -189,9 +190,7 @@ impl Work {
     /// Whether rough edges lie elsewhere than the blurred steps.
     fn is_elsewhere(&self) -> bool {
         let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
-        sides.iter().any(|(steps, rough)| {
-            (middle(steps.edges()) - middle(rough.lines())).abs() > ELSEWHERE_PX
-        })
+        sides.iter().any(|(steps, rough)| (steps.middle() - rough.middle()).abs() > ELSEWHERE_PX)
     }
 
     /// Whether a rough edge lies farther out than its blurred step, with no narrow
@@ -199,7 +198,7 @@ impl Work {
     fn is_wider(&self, fits: &[RoughFit; 2]) -> bool {
         let sides = [(&self.left, &self.rough[0], -1.0), (&self.right, &self.rough[1], 1.0)];
         sides.iter().zip(fits).any(|((steps, rough, outwards), fit)| {
-            let out = outwards * (middle(rough.lines()) - middle(steps.edges()));
+            let out = outwards * (rough.middle() - steps.middle());
             !fit.is_narrow_groove && out > WIDER_PX
         })
     }
@@ -251,13 +250,12 @@ fn are_two_levels(fits: &[RoughFit; 2]) -> bool {
     fits.iter().all(|fit| fit.odd_share < FEW_ODD)
 }
 
-/// Refuses a bead on ground whose pattern is as strong as its edges. `pattern` is its
-/// standard deviation \[grey levels\]; beside a groove it is another bead's.
+/// Refuses a bead beside a pattern that is as strong as its edges. `pattern` is its
+/// standard deviation \[grey levels\]: parts of it look like bead, and like grooves.
 fn check_pattern(pattern: f64, fits: &[RoughFit; 2]) -> Result<(), Reject> {
-    let is_on_ground = fits.iter().all(|fit| fit.is_on_ground && !fit.is_groove);
     let got = pattern / fits[0].contrast.min(fits[1].contrast);
-    let limit = STRONGEST;
-    if is_on_ground && got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
+    let limit = STRONGEST_BESIDE_ROUGH;
+    if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
 }
 
 /// Whether more shows about an edge than bead with its texture and ground.
@@ -273,12 +271,6 @@ fn is_covered(refused: &Reject) -> bool {
 /// Whether places of an edge were sorted out.
 fn has_gaps(steps: &Tracer) -> bool {
     steps.used_share() < 1.0 - FEW_GAPS
-}
-
-/// Mean of places across the bead \[px\].
-fn middle(places: &[Option<Located>]) -> f64 {
-    let sum: f64 = places.iter().flatten().map(|place| place.at).sum();
-    sum / float(places.iter().flatten().count().max(1))
 }
 
 /// Whether a frame that was refused as one with smooth edges may show a rough

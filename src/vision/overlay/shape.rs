@@ -101,6 +101,13 @@ impl Look {
         (self.noise / self.pixel_noise).powi(2)
     }
 
+    /// Variance of the edge's place from residuals that all rows share, as those of a
+    /// compression do \[px²\]: the Cramér–Rao bound for a profile with so much noise.
+    pub fn variance_of_misfit(&self) -> f64 {
+        let excess = self.pixel_noise.powi(2) * (self.misfit() - 1.0);
+        2.0 * std::f64::consts::PI.sqrt() * self.step.blur * excess
+    }
+
     /// Number of samples about the edge that the misfit is the mean of.
     pub fn samples(&self) -> f64 {
         let reach = FIT_BLURS * self.step.blur + FIT_BESIDE_PX;
