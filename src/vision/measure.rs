@@ -1,6 +1,7 @@
 //! One frame after the other: bands, candidates, contours, sub-pixel edges,
 //! width.
 
+mod choice;
 mod even;
 mod judge;
 mod locate;

@@ -184,45 +184,45 @@ impl fmt::Display for Reject {
         match self {
             Self::NoPair { got, need } => write!(
                 f,
-                "edges that belong together on {:.0} % of the caliper lines, {:.0} % are needed",
+                "edges that belong together on {:.0} % of the caliper lines, {:.0} % are needed; a bead has to run through the whole gauge along bead_axis, with a width in width_range_mm and the polarity that is named",
                 got * 100.0,
                 need * 100.0
             ),
             Self::LowContrast { got, need } => {
-                write!(f, "contrast of {got:.1} grey levels, {need:.1} are needed")
+                write!(f, "contrast of {got:.1} grey levels, {need:.1} are needed; more light, or light from one side, raises it")
             }
             Self::Saturated { got, limit } => write!(
                 f,
-                "{:.0} % of the bead or the gauge is saturated, {:.0} % is bearable",
+                "{:.0} % of the bead or the gauge is saturated, {:.0} % is bearable; a shorter exposure or less light helps",
                 got * 100.0,
                 limit * 100.0
             ),
             Self::Blinded { visible, need } => write!(
                 f,
-                "{:.0} % of the step between ground and bead lies within the camera's scale; it tells too little of the edge's place, {:.0} % and more are needed",
+                "{:.0} % of the step between ground and bead lies within the camera's scale; it tells too little of the edge's place, {:.0} % and more are needed; a shorter exposure or less light shows more of it",
                 visible * 100.0,
                 need * 100.0
             ),
             Self::WidthOutOfRange { got_mm, min_mm, max_mm } => {
-                write!(f, "width of {got_mm:.2} mm, believed are {min_mm} to {max_mm} mm")
+                write!(f, "width of {got_mm:.2} mm, believed are {min_mm} to {max_mm} mm; if that is the bead, width_range_mm has to contain it")
             }
             Self::Crooked { got_rad, limit_rad } => write!(
                 f,
-                "edges at {:.0} degrees to the gauge's axis, measured are up to {:.0}",
+                "edges at {:.0} degrees to the gauge's axis, measured are up to {:.0}; turn the camera, or set bead_axis as the bead runs",
                 got_rad.to_degrees(),
                 limit_rad.to_degrees()
             ),
             Self::Corner { got_widths, least_widths } if *got_widths <= 0.0 => write!(
                 f,
-                "the bead turns a corner within the gauge, measured are bends with a radius of {least_widths:.1} widths or more"
+                "the bead turns a corner within the gauge, measured are bends with a radius of {least_widths:.1} widths or more; a shorter gauge, or one where the bead runs straight, helps"
             ),
             Self::Corner { got_widths, least_widths } => write!(
                 f,
-                "the bead bends with a radius of {got_widths:.1} widths, measured are {least_widths:.1} or more"
+                "the bead bends with a radius of {got_widths:.1} widths, measured are {least_widths:.1} or more; a shorter gauge, or one where the bead bends less, helps"
             ),
             Self::Scattered { got_px, limit_px } => write!(
                 f,
-                "the places of an edge scatter by {got_px:.2} px about each other, {limit_px:.2} are bearable; along a rough bead more caliper lines help"
+                "the places of an edge scatter by {got_px:.2} px about each other, {limit_px:.2} are bearable: something lies on it, or it is the edge of no bead; a gauge that holds one bead and plain ground beside it helps"
             ),
             Self::Occluded { got_px, limit_px } => write!(
                 f,
@@ -268,16 +268,16 @@ impl fmt::Display for Reject {
             ),
             Self::Clipped { got_px, need_px } => write!(
                 f,
-                "an edge lies {got_px:.1} px from the border of the gauge, {need_px:.1} are needed"
+                "an edge lies {got_px:.1} px from the border of the gauge, {need_px:.1} are needed; a gauge that is wider across the bead helps"
             ),
             Self::WrongSize { image: (width, height) } => {
-                write!(f, "the gauge does not fit an image of {width}x{height} px")
+                write!(f, "the gauge does not fit an image of {width}x{height} px; roi_px has to lie within it")
             }
             Self::OtherSize { image: (width, height), calibrated: [across, down] } => write!(
                 f,
-                "the image has {width}x{height} px, the calibration was made with {across}x{down}"
+                "the image has {width}x{height} px, the calibration was made with {across}x{down}; take images of that size, or calibrate again"
             ),
-            Self::OffSurface => f.write_str("an edge has no point on the surface"),
+            Self::OffSurface => f.write_str("an edge has no point on the surface: the gauge reaches beyond the bed's horizon, or the calibration is that of another view"),
             Self::Unreadable => f.write_str("the frame could not be read"),
         }
     }

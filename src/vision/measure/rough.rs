@@ -1,5 +1,6 @@
 //! Beads whose edges are no blurred steps: torn ones, grooves, texture.
 
+use super::choice::has_grains;
 use super::{NEED_SHARE, Work, even};
 use crate::calib::SurfaceMap;
 use crate::vision::coarse::LinePair;
@@ -7,7 +8,6 @@ use crate::vision::gauge::Polarity;
 use crate::vision::reject::Reject;
 use crate::vision::rough::{RoughFit, Scene};
 use crate::vision::strip::{Grey, Strip, View};
-use crate::vision::trace::Tracer;
 use crate::vision::width::WidthMeasurement;
 
 /// The search range allows 1.5 times too wide and too narrow single places; lines
@@ -16,28 +16,7 @@ const LINE_SLACK: f32 = 1.4;
 
 /// Widest blur of a rough edge \[px\]: what lies outside is looked for within 20 px, and
 /// a flank of three blurs must end before.
-const WIDEST_ROUGH_PX: f64 = 6.3;
-/// Share of an edge's rows that may be sorted out: more are bays, or grains.
-const FEW_GAPS: f64 = 0.06;
-/// Contrast of an edge as a fraction of the other's below which it may be a rib's, and
-/// the distance at which another edge is not the same \[px\].
-const LOPSIDED: f64 = 0.6;
-const ELSEWHERE_PX: f64 = 3.0;
-/// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a
-/// wide flank.
-const PART_OF_FLANK: f64 = 0.5;
-/// How much farther out than a blurred step a rough edge may lie \[px\].
-const WIDER_PX: f64 = 1.0;
-/// Contrast of a rough edge over that of the blurred step from which on it is higher: by
-/// sparks on 5 % of the bead it is 1.05 to 1.1.
-const HIGHER: f64 = 1.04;
-/// Share of odd pixels about an edge up to which it is bead and ground alone: grains
-/// and sparks have more.
-const FEW_ODD: f64 = 0.01;
-/// By how much the share of odd pixels about an edge exceeds that within the bead where
-/// grains lie on it: concrete beads have up to 0.022, grains of 6 and 12 px on a third of
-/// the rows 0.027 to 0.14.
-const GRAINS: f64 = 0.024;
+pub const WIDEST_ROUGH_PX: f64 = 6.3;
 /// Strongest pattern beside rough edges, as a fraction of the contrast: beside beads of
 /// real concrete, other beads and grooves have up to 0.464.
 const STRONGEST_BESIDE_ROUGH: f64 = 0.48;
@@ -157,77 +136,6 @@ impl Work {
 }
 
 impl Work {
-    /// Whether edges that were measured as blurred steps may be something else.
-    pub(super) fn may_be_more_than_steps(&self) -> bool {
-        self.is_refined || self.is_beside_groove || self.has_gaps() || self.is_lopsided()
-    }
-
-    /// Whether places of the edges were sorted out.
-    fn has_gaps(&self) -> bool {
-        has_gaps(&self.left) || has_gaps(&self.right)
-    }
-
-    /// Whether rough edges are not higher than the blurred steps: then what was sorted
-    /// out shows ground. Dark grains beside an edge, sparks within and shading make rough
-    /// edges higher; holes within make them lower.
-    fn is_no_higher(&self, fits: &[RoughFit; 2]) -> bool {
-        fits.iter().zip(self.contrasts).all(|(fit, step)| fit.contrast < HIGHER * step)
-    }
-
-    /// Whether the blurred steps are parts of flanks that are wider than any blur.
-    fn are_parts_of_flanks(&self, fits: &[RoughFit; 2]) -> bool {
-        let mut sides = fits.iter().zip(self.contrasts);
-        let is_wide = self.is_refined && fits.iter().any(|fit| fit.blur_px > WIDEST_ROUGH_PX);
-        is_wide || sides.all(|(fit, step)| step < PART_OF_FLANK * fit.contrast)
-    }
-
-    /// Whether one edge is much fainter than the other, as a rib's is.
-    fn is_lopsided(&self) -> bool {
-        let [left, right] = self.contrasts;
-        left.min(right) < LOPSIDED * left.max(right)
-    }
-
-    /// Whether rough edges lie elsewhere than the blurred steps.
-    fn is_elsewhere(&self) -> bool {
-        let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
-        sides.iter().any(|(steps, rough)| (steps.middle() - rough.middle()).abs() > ELSEWHERE_PX)
-    }
-
-    /// Whether a rough edge lies farther out than its blurred step, with no narrow
-    /// groove in between: bays take bead away, and what adds some is a shadow beside it.
-    fn is_wider(&self, fits: &[RoughFit; 2]) -> bool {
-        let sides = [(&self.left, &self.rough[0], -1.0), (&self.right, &self.rough[1], 1.0)];
-        sides.iter().zip(fits).any(|((steps, rough, outwards), fit)| {
-            let out = outwards * (rough.middle() - steps.middle());
-            !fit.is_narrow_groove && out > WIDER_PX
-        })
-    }
-
-    /// Whether rough edges explain more than blurred steps do: a groove that no step
-    /// is, or bays in an edge that were sorted out as grains.
-    pub(super) fn explains_more(&self, fits: &[RoughFit; 2]) -> bool {
-        if self.is_lopsided() && self.is_elsewhere() || self.are_parts_of_flanks(fits) {
-            return true;
-        }
-        if self.is_wider(fits) {
-            return false;
-        }
-        let two_levels = are_two_levels(fits);
-        // Texture that is known on both sides looks like a groove here and there.
-        let knows_texture = self.left.knows_texture() && self.right.knows_texture();
-        let hidden = !knows_texture && fits.iter().any(|fit| fit.is_narrow_groove);
-        if self.is_refined {
-            let has_grains = fits.iter().any(has_grains);
-            let grooved = hidden || fits.iter().any(|fit| fit.is_groove);
-            grooved && !has_grains && (two_levels || !self.is_lost)
-        } else {
-            // Grains here and there look like a groove in the mean over the gauge.
-            let is_covered = self.left.is_covered() || self.right.is_covered();
-            let bays = two_levels && self.has_gaps() && self.is_no_higher(fits);
-            bays || hidden && !is_covered
-        }
-    }
-
     /// Refuses a pair that the bead's texture may have made.
     fn check_stands_out(&self, pair: &LinePair) -> Result<(), Reject> {
         let [left, right] = pair.sides;
@@ -245,11 +153,6 @@ impl Work {
     }
 }
 
-/// Whether edges show bead and what lies outside, and no grains.
-fn are_two_levels(fits: &[RoughFit; 2]) -> bool {
-    fits.iter().all(|fit| fit.odd_share < FEW_ODD)
-}
-
 /// Refuses a bead beside a pattern that is as strong as its edges. `pattern` is its
 /// standard deviation \[grey levels\]: parts of it look like bead, and like grooves.
 fn check_pattern(pattern: f64, fits: &[RoughFit; 2]) -> Result<(), Reject> {
@@ -258,19 +161,9 @@ fn check_pattern(pattern: f64, fits: &[RoughFit; 2]) -> Result<(), Reject> {
     if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
 }
 
-/// Whether more shows about an edge than bead with its texture and ground.
-fn has_grains(fit: &RoughFit) -> bool {
-    fit.odd_share > fit.odd_within_share + GRAINS
-}
-
 /// Whether a frame was refused for what hides its edges, which may be grains.
 fn is_covered(refused: &Reject) -> bool {
     matches!(refused, Reject::Scattered { .. } | Reject::Occluded { .. } | Reject::NoPair { .. })
-}
-
-/// Whether places of an edge were sorted out.
-fn has_gaps(steps: &Tracer) -> bool {
-    steps.used_share() < 1.0 - FEW_GAPS
 }
 
 /// Whether a frame that was refused as one with smooth edges may show a rough

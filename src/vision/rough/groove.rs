@@ -334,3 +334,6 @@ impl Problem<'_> {
         (misfit < MAX_MISFIT).then_some(shape)
     }
 }
+
+#[cfg(test)]
+mod tests;
