@@ -4,7 +4,7 @@
 //! an edge does not.
 
 use super::number::single;
-use super::pair::{GAP_SHARE, RIVAL_SHARE, SAME_WIDTH, SEAM_SHARE};
+use super::pair::{RIVAL_SHARE, SAME_WIDTH, SEAM_SHARE};
 use super::rank;
 use super::rough::whole;
 use super::strip::{Grey, Strip};
@@ -34,6 +34,9 @@ const GROOVE_FALL_PX: f32 = 20.0;
 const FAR_SIDE: f32 = 0.5;
 /// Distance of a seam from an edge \[px\]: nearer lines belong to the edge's flank.
 const SEAM_APART_PX: f32 = 6.0;
+/// [`SEAM_SHARE`] and [`RIVAL_SHARE`] where the stronger pair lies within the other one:
+/// rough edges are some tenths fainter in the mean along a line than ribs are.
+const INNER_SHARES: (f32, f32) = (0.5, 0.8);
 /// Lines of each sign that are looked at.
 const MAX_LINES: usize = 8;
 /// Difference of slope at which a pair of lines counts for 1/e.
@@ -134,30 +137,36 @@ impl Coarse {
         out.sort_by(|a, b| b.score.total_cmp(&a.score));
     }
 
-    /// Whether two pairs have one edge in common, the other edge of the narrower one is
-    /// that of a seam or a rib within the wider one, and either may be the bead.
+    /// Whether one of two pairs lies within the other, each of its edges that is not also
+    /// the other's is that of a seam or a rib within the wider one, and either may be the
+    /// bead.
     pub fn are_rivals(&self, pair: &LinePair, other: &LinePair) -> bool {
         let (inner, outer) =
             if pair.width_px() < other.width_px() { (pair, other) } else { (other, pair) };
         let [left, right] = outer.sides;
-        let shares_one = (inner.sides[0] == left) != (inner.sides[1] == right);
+        let is_within = inner.sides[0].at >= left.at && inner.sides[1].at <= right.at;
         let narrower = inner.width_px() < (1.0 - SAME_WIDTH) * outer.width_px();
-        if pair.bright != other.bright || !shares_one || !narrower {
+        if pair.bright != other.bright || !is_within || !narrower {
             return false;
         }
         let gap = self.gap(outer) / left.step.min(right.step);
         let (ins, outs) =
             if outer.bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
-        let least = SEAM_SHARE * left.step.max(right.step);
-        let (end, partners) =
-            if inner.sides[0] == left { (inner.sides[1], ins) } else { (inner.sides[0], outs) };
-        let has_partner = partners.iter().any(|line| {
-            let apart = (line.at - left.at).min(right.at - line.at);
-            line.step >= least && apart > SEAM_APART_PX && (line.at - end.at).abs() < GROOVE_PX
-        });
-        let is_line = end.step >= least;
-        let fits = other.bare >= RIVAL_SHARE * pair.bare || outer == pair && gap > SEAM_SHARE;
-        is_line && has_partner && fits && (outer == pair || gap < GAP_SHARE)
+        // The narrower pair, where it is the stronger one, owes that to its rib.
+        let (seam, rival) = if inner == pair { INNER_SHARES } else { (SEAM_SHARE, RIVAL_SHARE) };
+        let least = seam * left.step.max(right.step);
+        let is_of_rib = |end: &StepLine, partners: &[StepLine]| {
+            let mut partners = partners.iter().filter(|line| line.step >= least);
+            let has_partner = partners.any(|line| {
+                let apart = (line.at - left.at).min(right.at - line.at);
+                apart > SEAM_APART_PX && (line.at - end.at).abs() < GROOVE_PX
+            });
+            end.step >= least && has_partner
+        };
+        let ends = [(&inner.sides[0], left, outs), (&inner.sides[1], right, ins)];
+        let mut ribs = ends.into_iter().filter(|(end, edge, _)| **end != *edge);
+        let fits = other.bare >= rival * pair.bare || outer == pair && gap > SEAM_SHARE;
+        fits && ribs.all(|(end, _, partners)| is_of_rib(end, partners))
     }
 
     /// Depth of the deepest gap between the edges of a pair \[grey levels\]: a line out

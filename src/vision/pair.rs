@@ -8,7 +8,7 @@ use super::rank;
 
 /// Depth of a gap between two edges, as a share of the weaker one, that shows them
 /// to belong to two beads: it is deeper than the bead is high over the ground.
-pub const GAP_SHARE: f32 = 1.1;
+const GAP_SHARE: f32 = 1.1;
 /// The same up to which it is a seam within one bead. A seam of 60 % is no edge, and
 /// a little is left to noise.
 pub const SEAM_SHARE: f32 = 0.64;

@@ -2,6 +2,7 @@
 //! a groove that no step is, bays, or a flank that is wider than any blur.
 
 use super::Work;
+use super::judge::WIDEST_BLUR_PX;
 use super::rough::WIDEST_ROUGH_PX;
 use crate::vision::rough::RoughFit;
 use crate::vision::trace::Tracer;
@@ -15,6 +16,8 @@ const ELSEWHERE_PX: f64 = 3.0;
 /// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a
 /// wide flank.
 const PART_OF_FLANK: f64 = 0.5;
+/// Blur of a step from which on it may be a part of a flank \[px\].
+const WIDE_PX: f64 = 3.5;
 /// How much farther out than a blurred step a rough edge may lie \[px\].
 const WIDER_PX: f64 = 1.0;
 /// Contrast of a rough edge over that of the blurred step from which on it is higher: by
@@ -31,7 +34,13 @@ const GRAINS: f64 = 0.024;
 impl Work {
     /// Whether edges that were measured as blurred steps may be something else.
     pub(super) fn may_be_more_than_steps(&self) -> bool {
-        self.is_refined || self.is_beside_groove || self.has_gaps() || self.is_lopsided()
+        let is_other = self.is_refined || self.is_beside_groove || self.is_wide();
+        is_other || self.has_gaps() || self.is_lopsided()
+    }
+
+    /// Whether the flanks are so wide that rows alone do not tell bays in them.
+    fn is_wide(&self) -> bool {
+        self.left.blur_px.max(self.right.blur_px) > WIDE_PX
     }
 
     /// Whether places of the edges were sorted out.
@@ -49,7 +58,8 @@ impl Work {
     /// Whether the blurred steps are parts of flanks that are wider than any blur.
     fn are_parts_of_flanks(&self, fits: &[RoughFit; 2]) -> bool {
         let mut sides = fits.iter().zip(self.contrasts);
-        let is_wide = self.is_refined && fits.iter().any(|fit| fit.blur_px > WIDEST_ROUGH_PX);
+        let is_wide = self.is_refined && fits.iter().any(|fit| fit.blur_px > WIDEST_ROUGH_PX)
+            || fits.iter().all(|fit| fit.blur_px > WIDEST_BLUR_PX);
         is_wide || sides.all(|(fit, step)| step < PART_OF_FLANK * fit.contrast)
     }
 
@@ -95,8 +105,8 @@ impl Work {
         } else {
             // Grains here and there look like a groove in the mean over the gauge.
             let is_covered = self.left.is_covered() || self.right.is_covered();
-            let bays = two_levels && self.has_gaps() && self.is_no_higher(fits);
-            bays || hidden && !is_covered
+            let has_bays = two_levels && self.has_gaps() && self.is_no_higher(fits);
+            !self.is_wide() && (has_bays || hidden && !is_covered)
         }
     }
 }

@@ -57,9 +57,9 @@ const ROOT_TWO_PI: f64 = 2.506_628_274_631_000_5;
 /// is measured without fault up to 7.4 px of blur, and was off by some pixels from
 /// 7.5 px on.
 pub(super) const WIDEST_BLUR_PX: f64 = 7.4;
-/// The same of a box of even motion with a lens's blur: motion of 17 px. Flanks of longer
+/// The same of a box of even motion with a lens's blur: motion of 15.8 px. Flanks of longer
 /// ones were taken for shading once in some hundred frames, and the width was 1 px off.
-pub(super) const WIDEST_MOTION_PX: f64 = 5.0;
+pub(super) const WIDEST_MOTION_PX: f64 = 4.8;
 
 impl Work {
     /// Whether one edge alone is hidden: then it is covered, not of another kind
