@@ -83,6 +83,8 @@ struct Work {
     is_lost: bool,
     /// Whether edges were located line by line.
     is_refined: bool,
+    /// Whether edges were located from what is seen below the end of the scale.
+    is_cut_off: bool,
     /// Whether a narrow groove may lie beside an edge.
     is_beside_groove: bool,
     /// Standard deviation of the pattern that the ground has on both sides, as a
@@ -125,6 +127,7 @@ impl Measurer {
             least_off_px: OFF_PX,
             is_lost: false,
             is_refined: false,
+            is_cut_off: false,
             is_beside_groove: false,
             pattern_share: 0.0,
             contrasts: [0.0; 2],

@@ -32,8 +32,12 @@ const FEW_ODD: f64 = 0.01;
 const GRAINS: f64 = 0.024;
 
 impl Work {
-    /// Whether edges that were measured as blurred steps may be something else.
+    /// Whether edges that were measured as blurred steps may be something else. Where they
+    /// pass the end of the scale, rows do not tell: half of their height is not seen.
     pub(super) fn may_be_more_than_steps(&self) -> bool {
+        if self.is_cut_off {
+            return false;
+        }
         let is_other = self.is_refined || self.is_beside_groove || self.is_wide();
         is_other || self.has_gaps() || self.is_lopsided()
     }
