@@ -56,6 +56,17 @@ pub struct Measurer {
     work: Work,
 }
 
+/// How edges were located.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    /// As blurred steps, all rows together.
+    Steps,
+    /// From what is seen below the end of the scale.
+    CutOff,
+    /// Line by line.
+    Lines,
+}
+
 /// What a measurement works on.
 #[derive(Debug, Clone)]
 struct Work {
@@ -81,10 +92,7 @@ struct Work {
     right: Tracer,
     least_off_px: f64,
     is_lost: bool,
-    /// Whether edges were located line by line.
-    is_refined: bool,
-    /// Whether edges were located from what is seen below the end of the scale.
-    is_cut_off: bool,
+    way: Way,
     /// Whether a narrow groove may lie beside an edge.
     is_beside_groove: bool,
     /// Standard deviation of the pattern that the ground has on both sides, as a
@@ -126,8 +134,7 @@ impl Measurer {
             right: Tracer::default(),
             least_off_px: OFF_PX,
             is_lost: false,
-            is_refined: false,
-            is_cut_off: false,
+            way: Way::Steps,
             is_beside_groove: false,
             pattern_share: 0.0,
             contrasts: [0.0; 2],
@@ -316,7 +323,7 @@ impl Work {
         self.trace(strip, pair)?;
         self.sort_out(pair.bright)?;
         self.check_contrast()?;
-        let is_motion = self.blur_shapes.is_motion() && !self.is_refined;
+        let is_motion = self.blur_shapes.is_motion() && self.way != Way::Lines;
         self.check_blur(if is_motion { WIDEST_MOTION_PX } else { WIDEST_BLUR_PX })?;
         self.check_ground(strip, f64::max)?;
         self.check_border(strip.across)?;

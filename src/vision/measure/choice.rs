@@ -1,9 +1,9 @@
 //! Whether edges that were measured as blurred steps are better told by rough ones:
 //! a groove that no step is, bays, or a flank that is wider than any blur.
 
-use super::Work;
 use super::judge::WIDEST_BLUR_PX;
 use super::rough::WIDEST_ROUGH_PX;
+use super::{Way, Work};
 use crate::vision::rough::RoughFit;
 use crate::vision::trace::Tracer;
 
@@ -35,11 +35,16 @@ impl Work {
     /// Whether edges that were measured as blurred steps may be something else. Where they
     /// pass the end of the scale, rows do not tell: half of their height is not seen.
     pub(super) fn may_be_more_than_steps(&self) -> bool {
-        if self.is_cut_off {
+        if self.way == Way::CutOff {
             return false;
         }
-        let is_other = self.is_refined || self.is_beside_groove || self.is_wide();
+        let is_other = self.is_refined() || self.is_beside_groove || self.is_wide();
         is_other || self.has_gaps() || self.is_lopsided()
+    }
+
+    /// Whether edges were located line by line.
+    fn is_refined(&self) -> bool {
+        self.way == Way::Lines
     }
 
     /// Whether the flanks are so wide that rows alone do not tell bays in them.
@@ -62,7 +67,7 @@ impl Work {
     /// Whether the blurred steps are parts of flanks that are wider than any blur.
     fn are_parts_of_flanks(&self, fits: &[RoughFit; 2]) -> bool {
         let mut sides = fits.iter().zip(self.contrasts);
-        let is_wide = self.is_refined && fits.iter().any(|fit| fit.blur_px > WIDEST_ROUGH_PX)
+        let is_wide = self.is_refined() && fits.iter().any(|fit| fit.blur_px > WIDEST_ROUGH_PX)
             || fits.iter().all(|fit| fit.blur_px > WIDEST_BLUR_PX);
         is_wide || sides.all(|(fit, step)| step < PART_OF_FLANK * fit.contrast)
     }
@@ -102,7 +107,7 @@ impl Work {
         // Texture that is known on both sides looks like a groove here and there.
         let knows_texture = self.left.knows_texture() && self.right.knows_texture();
         let hidden = !knows_texture && fits.iter().any(|fit| fit.is_narrow_groove);
-        if self.is_refined {
+        if self.is_refined() {
             let has_grains = fits.iter().any(has_grains);
             let grooved = hidden || fits.iter().any(|fit| fit.is_groove);
             grooved && !has_grains && (two_levels || !self.is_lost)

@@ -3,7 +3,7 @@
 
 use super::judge::is_strange;
 use super::search::Found;
-use super::{NEED_SHARE, OFF_PX, Work};
+use super::{NEED_SHARE, OFF_PX, Way, Work};
 use crate::vision::covered;
 use crate::vision::motion::BlurShapes;
 use crate::vision::noise;
@@ -46,7 +46,7 @@ impl Work {
         let scenes = [scene, right_scene];
         let mut seen = [None; 2];
         self.blur_shapes.reset();
-        (self.is_lost, self.is_refined, self.is_cut_off) = (false, false, false);
+        (self.is_lost, self.way) = (false, Way::Steps);
         // A loop, so that what is inlined into it is compiled once for both.
         let sides = [(&mut self.left, lefts), (&mut self.right, rights)];
         for ((tracer, rough), (scene, seen)) in sides.into_iter().zip(scenes.iter().zip(&mut seen))
@@ -57,7 +57,7 @@ impl Work {
         if let [Some(_), Some(_)] = seen {
             let cut_off = [self.left.is_cut_off(&scene), self.right.is_cut_off(&right_scene)];
             if cut_off != [[false; 2]; 2] {
-                (self.least_off_px, self.is_cut_off) = (OFF_PX, true);
+                (self.least_off_px, self.way) = (OFF_PX, Way::CutOff);
                 let tracers = [&mut self.left, &mut self.right];
                 let bead = saturated::Bead { scenes, lefts, rights };
                 self.noise = bead.trace(tracers, self.blur_shapes.table(), cut_off)?;
@@ -85,7 +85,7 @@ impl Work {
                 return Ok(());
             }
         }
-        (self.least_off_px, self.is_refined) = (LINE_OFF_PX, true);
+        (self.least_off_px, self.way) = (LINE_OFF_PX, Way::Lines);
         // What is no blurred step does not tell how a motion blurs it.
         let lens = self.blur_shapes.lens();
         let left = self.left.refine(lens, &scene);
