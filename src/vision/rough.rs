@@ -52,6 +52,7 @@ const LIKELY_GROOVE: f64 = 0.25;
 /// deviation of the shift that this makes, as a fraction of it.
 const LEVEL_OFF: f64 = 1.0;
 const SHIFT_FRACTION: f64 = 0.2;
+
 /// What is looked at.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<'a, T> {
@@ -159,17 +160,17 @@ impl RoughEdge {
         let bead_grey = mean.bead();
         let known = other.filter(|blur| blur.variance < UNKNOWN_BLUR.variance);
         let shape = known.and_then(|blur| self.fit_shape(blur)).or(self.shape);
-        let groove = shape.filter(|shape| shape.groove_share > LIKELY_GROOVE);
+        let is_groove_likely = shape.is_some_and(|shape| shape.groove_share > LIKELY_GROOVE);
         let noise = noise::of_mean(&self.windows, &self.levels, &self.crossings, scene)?;
         // Where a rib or a shade lies within, only the level beside the edge is the bead's.
-        let shaped = shape.filter(|shape| shape.level_off > LEVEL_OFF).or(groove);
+        let shaped = shape.filter(|shape| is_groove_likely || shape.level_off > LEVEL_OFF);
         let shift =
             shaped.map_or(0.0, |shape| shape.at - float(OUTSIDE) - self.crossings.off_course);
         for at in &mut self.crossings.at {
             *at += narrow(shift);
         }
         let of_shape = |shape: EdgeShape| {
-            if groove.is_some() {
+            if is_groove_likely {
                 return shape.variance;
             }
             shape.variance.max(noise.of_mean) + (SHIFT_FRACTION * shift).powi(2)
@@ -183,7 +184,7 @@ impl RoughEdge {
             blur_px: noise.blur_px,
             bead_grey,
             is_groove,
-            is_narrow_groove: groove.is_some(),
+            is_narrow_groove: is_groove_likely,
             is_on_ground: on_ground,
             odd_share: noise::mean_of(&self.crossings.odd),
             odd_within_share: noise::mean_of(&self.crossings.odd_within),

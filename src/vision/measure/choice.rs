@@ -5,7 +5,6 @@ use super::judge::WIDEST_BLUR_PX;
 use super::rough::WIDEST_ROUGH_PX;
 use super::{Way, Work};
 use crate::vision::rough::RoughFit;
-use crate::vision::trace::Tracer;
 
 /// Share of an edge's rows that may be sorted out: more are bays, or grains.
 const FEW_GAPS: f64 = 0.06;
@@ -54,7 +53,7 @@ impl Work {
 
     /// Whether places of the edges were sorted out.
     fn has_gaps(&self) -> bool {
-        has_gaps(&self.left) || has_gaps(&self.right)
+        self.left.used_share().min(self.right.used_share()) < 1.0 - FEW_GAPS
     }
 
     /// Whether rough edges are not higher than the blurred steps: then what was sorted
@@ -128,9 +127,4 @@ fn are_two_levels(fits: &[RoughFit; 2]) -> bool {
 /// Whether more shows about an edge than bead with its texture and ground.
 pub fn has_grains(fit: &RoughFit) -> bool {
     fit.odd_share > fit.odd_within_share + GRAINS
-}
-
-/// Whether places of an edge were sorted out.
-fn has_gaps(steps: &Tracer) -> bool {
-    steps.used_share() < 1.0 - FEW_GAPS
 }
