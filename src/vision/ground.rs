@@ -1,5 +1,5 @@
-//! The pattern of what lies beside the bead: how strong it is, and how far it may
-//! move the mean of an edge.
+//! The pattern of what lies beside an edge, ground or bead: how strong it is, and how far
+//! it may move the mean of the edge.
 
 use super::number::{float, narrow};
 use super::rank;
@@ -17,6 +17,9 @@ const LEAST_LINES: usize = 8;
 /// Part of the noise's variance by which a pattern's must exceed it: less is not told
 /// from noise.
 const TOLD: f64 = 0.25;
+
+/// Standard deviation of normal numbers over the median of their magnitudes.
+const PER_MEDIAN: f64 = 1.4826;
 
 /// Places beside the edge within which a narrow groove lies \[px\].
 const GROOVE_PX: usize = 9;
@@ -112,6 +115,34 @@ impl Ground {
             size_grey: variance.sqrt(),
             mean_variance: self.variance_of_mean(count, noise),
         })
+    }
+
+    /// Standard deviation of the texture along a side, without the pixels' noise
+    /// \[grey levels\], from the median of how far pixels are off: a few sparks or holes
+    /// are none. `None` as for a pattern.
+    pub fn texture<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        side: &Side<'_>,
+        noise: f64,
+    ) -> Option<f64> {
+        let count = side.places.len();
+        if count < LEAST_LINES {
+            return None;
+        }
+        self.read(strip, side);
+        let mut spreads = [0.0_f32; COLUMNS];
+        let mut columns = 0;
+        for (column, spread) in self.columns.chunks_exact_mut(count).zip(&mut spreads) {
+            for value in column.iter_mut() {
+                *value = value.abs();
+            }
+            *spread = narrow(PER_MEDIAN * rank::median(column)?);
+            columns += 1;
+        }
+        let spread = f64::from(rank::median(&mut spreads[..columns])?);
+        let variance = spread * spread - noise * noise;
+        (variance > TOLD * noise * noise).then(|| variance.sqrt())
     }
 
     /// Reads columns of pixels beside an edge, as far as they lie within the gauge.

@@ -1,11 +1,13 @@
-//! One edge on ground that has a pattern, from the mean profile along its course.
+//! One edge of a bead with texture, or on ground that has a pattern, from the mean profile
+//! along its course.
 //!
 //! A search that follows the strongest step from row to row is drawn outwards by bright
-//! patches of the ground. Here the position is linear in the pixels: a pattern with a
-//! mean of zero moves it as often outwards as inwards. The course has as few degrees of
-//! freedom as the gauge supports: a line, and a bend where it is certain. How far the
-//! pattern moves the edge is read from the ground itself: the same weights, held
-//! against places of the ground where there is no edge.
+//! patches of the ground, and inwards by dark ones of the bead. Here the position is
+//! linear in the pixels: a pattern with a mean of zero moves it as often outwards as
+//! inwards, and what remains to the second order is taken off. The course has as few
+//! degrees of freedom as the gauge supports: a line, and a bend where it is certain. How
+//! far a pattern moves the edge is read from the ground and the bead themselves: the same
+//! weights, held against places where there is no edge.
 
 mod weights;
 
@@ -40,7 +42,7 @@ const FARTHEST_PX: f64 = 10.0;
 const BENDS: f64 = 4.0;
 /// Ground that is looked at \[px\], and bead: other things lie farther away.
 const GROUND_PX: usize = 100;
-const BEAD_PX: usize = 60;
+const BEAD_PX: usize = 120;
 /// Distance from the edge at which ground and bead are free of the flank, in blurs.
 const FREE_BLURS: f64 = 4.0;
 /// Bead beside the flank whose mean is its level \[px\].
@@ -233,13 +235,13 @@ impl MeanEdge {
         let [ground, bead] = self.beside(scene, free, 0);
         let bead_grey = mean(&bead[..bead.len().min(LEVEL_PX)])?;
         let contrast = found.step.min(bead_grey - mean(&ground)?);
-        let square = found.step * found.step;
-        self.gather(scene, &weights, contrast, found.step);
-        if !weights.is_like(&ground, found.ground) {
+        if !weights.is_like(&ground, found.ground, found.step) {
             return None;
         }
         let samples = [weights.on_ground(&ground), weights.on_bead(&bead)];
-        let samples = samples.map(|of| Samples { squares: of.squares / square, ..of });
+        let samples = samples.map(|of| of.over(found.step));
+        let shift = samples[0].shift() + samples[1].shift();
+        self.gather(scene, &weights, (contrast, found.step), shift);
         (contrast > 0.0).then_some(MeanFit { samples, contrast, bead_grey })
     }
 
@@ -310,8 +312,14 @@ impl MeanEdge {
         sides
     }
 
-    /// Positions of the caliper lines.
-    fn gather<T: Grey>(&mut self, scene: &Scene<'_, T>, weights: &Weights, height: f64, step: f64) {
+    /// Positions of the caliper lines, less what all are shifted inwards by.
+    fn gather<T: Grey>(
+        &mut self,
+        scene: &Scene<'_, T>,
+        weights: &Weights,
+        (height, step): (f64, f64),
+        shift: f64,
+    ) {
         self.lines.clear();
         let mut positions = Vec::with_capacity(scene.lines.len());
         for &(from, to) in scene.lines {
@@ -324,7 +332,8 @@ impl MeanEdge {
                     aside += weight * scene.grey(row, at + off);
                 }
             }
-            positions.push((middle, scene.inwards() * aside / step / float(to - from)));
+            let aside = aside / step / float(to - from) - shift;
+            positions.push((middle, scene.inwards() * aside));
         }
         let squares: f64 = positions.iter().map(|(_, aside)| aside * aside).sum();
         let variance = squares / float(positions.len().max(1));

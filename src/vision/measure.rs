@@ -98,6 +98,8 @@ struct Work {
     /// Standard deviation of the pattern that the ground has on both sides, as a
     /// fraction of the contrast; 0 where one side has none.
     pattern_share: f64,
+    /// The same of the texture that the bead has beside both edges.
+    texture_share: f64,
     contrasts: [f64; 2],
     scatter: Vec<f64>,
     middles: Vec<f64>,
@@ -137,6 +139,7 @@ impl Measurer {
             way: Way::Steps,
             is_beside_groove: false,
             pattern_share: 0.0,
+            texture_share: 0.0,
             contrasts: [0.0; 2],
             scatter: Vec::new(),
             middles: Vec::new(),
@@ -287,26 +290,40 @@ impl Work {
         self.noise = noise::of(strip, 0..strip.across);
         self.bands.pool(strip, self.gauge.calipers);
         pool::cut(strip.along, self.gauge.calipers, &mut self.lines);
-        let found = self.measure_steps(strip, range, view, surface);
-        if found.is_ok()
-            && self.pattern_share > 0.0
-            && !(self.left.knows_texture() && self.right.knows_texture())
-            && let Some(on_pattern) = self.measure_on_pattern(strip, range, view, surface)
-        {
-            return on_pattern;
-        }
-        match found {
+        match self.measure_steps(strip, range, view, surface) {
+            Ok(found) => self.measure_again(found, strip, range, view, surface),
             Err(reject) if may_be_rough(&reject) => self
                 .measure_rough(&reject, strip, range, view, surface)
                 .map_err(|rough| rough.or(reject)),
-            Ok(found) if self.may_be_more_than_steps() => match self.find_rough(strip, range) {
-                Ok(fits) if self.explains_more(&fits) => {
-                    self.take_rough(&fits, strip, view, surface)
-                }
-                _ => Ok(found),
-            },
-            found => found,
+            Err(reject) => Err(reject),
         }
+    }
+
+    /// Measures edges that were measured as blurred steps in another way, where that tells
+    /// more; otherwise gives what was found.
+    fn measure_again<T: Grey>(
+        &mut self,
+        found: WidthMeasurement,
+        strip: &Strip<'_, T>,
+        range: (f32, f32),
+        view: &View,
+        surface: &SurfaceMap,
+    ) -> Result<WidthMeasurement, Reject> {
+        let knows_texture = self.left.knows_texture() && self.right.knows_texture();
+        let may_be_textured = self.pattern_share.max(self.texture_share) > 0.0;
+        if may_be_textured
+            && !knows_texture
+            && let Some(textured) = self.measure_textured(strip, range, view, surface)
+        {
+            return textured;
+        }
+        if self.may_be_more_than_steps()
+            && let Ok(fits) = self.find_rough(strip, range)
+            && self.explains_more(&fits)
+        {
+            return self.take_rough(&fits, strip, view, surface);
+        }
+        Ok(found)
     }
 
     /// Measures edges that are blurred steps.

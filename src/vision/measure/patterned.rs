@@ -1,9 +1,12 @@
-//! Beads on ground that has a pattern.
+//! Beads that have a texture, or lie on ground that has a pattern.
 
 use super::{NEED_SHARE, Work, even};
 use crate::calib::SurfaceMap;
 use crate::vision::coarse::LinePair;
+use crate::vision::ground::{Place, Side};
 use crate::vision::mean_edge::{BLURS_PX, Scene};
+use crate::vision::number::float;
+use crate::vision::pool;
 use crate::vision::reject::Reject;
 use crate::vision::strip::{Grey, Strip, View};
 use crate::vision::width::WidthMeasurement;
@@ -14,6 +17,10 @@ const STRONGEST: f64 = 0.37;
 /// Weakest pattern, as a fraction of the contrast, beside which blurred steps are not
 /// good enough: one of less draws them outwards by hardly 0.02 px.
 const NOTABLE: f64 = 0.06;
+/// The same of the bead's texture: sparks over 5 % of a smooth bead look like up to 0.12.
+const NOTABLE_TEXTURE: f64 = 0.13;
+/// Blur beyond which a bead's texture is free of a flank that is not known yet \[px\].
+const LARGE_BLUR_PX: f64 = 3.0;
 /// Variance of the ground along the bead in that of the noise from which on it has a
 /// pattern: less is not told from noise.
 const TOLD: f64 = 1.25;
@@ -38,11 +45,11 @@ impl Work {
         (variance > TOLD * noise * noise).then(|| (variance - noise * noise).sqrt())
     }
 
-    /// Measures a bead that was measured already, where the ground has a pattern.
-    /// `None` where it has not, or a weak one, or no lines are found.
+    /// Measures a bead that was measured already, where it or the ground has a pattern.
+    /// `None` where neither has, or a weak one, or no lines are found.
     #[cold]
     #[inline(never)]
-    pub(super) fn measure_on_pattern<T: Grey>(
+    pub(super) fn measure_textured<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
         range: (f32, f32),
@@ -50,13 +57,30 @@ impl Work {
         surface: &SurfaceMap,
     ) -> Option<Result<WidthMeasurement, Reject>> {
         let pair = self.find_lines(strip, range).ok()?;
-        let pattern = self.ground_pattern(strip, &pair)?;
+        let pattern = self.ground_pattern(strip, &pair).unwrap_or(0.0);
         let contrast = self.contrasts[0].min(self.contrasts[1]);
-        if pattern < NOTABLE * contrast {
+        if pattern < NOTABLE * contrast && self.texture_share < NOTABLE_TEXTURE {
             return None;
         }
         let found = self.measure_patterned((&pair, pattern), strip, view, surface);
         if let Err(Reject::NoPair { .. }) = found { None } else { Some(found) }
+    }
+
+    /// Whether the bead between two lines has a texture beside both.
+    pub(super) fn is_textured<T: Grey>(&mut self, strip: &Strip<'_, T>, pair: &LinePair) -> bool {
+        let middle = 0.5 * (float(strip.along) - 1.0);
+        let noise = f64::from(self.noise);
+        let sides = pair.sides.iter().zip([1.0, -1.0]);
+        sides.into_iter().all(|(line, inwards)| {
+            self.places.clear();
+            self.places.extend(self.lines.iter().map(|&rows| {
+                let off = pool::middle(rows) - middle;
+                Place { rows, at: f64::from(line.at) + off * f64::from(line.slope) }
+            }));
+            let side = Side { places: &self.places, outwards: inwards, blur_px: LARGE_BLUR_PX };
+            let texture = self.ground.texture(strip, &side, noise);
+            texture.is_some_and(|texture| texture > NOTABLE_TEXTURE * f64::from(line.step))
+        })
     }
 
     /// Measures a bead whose ground has a pattern of such a standard deviation

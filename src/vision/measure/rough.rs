@@ -41,8 +41,9 @@ impl Work {
     ) -> Result<WidthMeasurement, Reject> {
         let pair = self.find_lines(strip, range)?;
         let pattern = self.ground_pattern(strip, &pair);
-        if let Some(pattern) = pattern {
-            let found = self.measure_patterned((&pair, pattern), strip, view, surface);
+        if pattern.is_some() || self.is_textured(strip, &pair) {
+            let scene = (&pair, pattern.unwrap_or(0.0));
+            let found = self.measure_patterned(scene, strip, view, surface);
             if !matches!(found, Err(Reject::NoPair { .. })) {
                 return found;
             }
