@@ -68,6 +68,9 @@ pub struct AccuracyArgs {
     /// `ribs` names both `ribs-weak` and `ribs-strong`
     #[arg(long, value_name = "all|NAME[,NAME…]", value_delimiter = ',', conflicts_with_all = ["calibration", "sets"])]
     random: Vec<String>,
+    /// With --random: number of the first frame, for frames on which nothing was tuned
+    #[arg(long, value_name = "N", default_value = "0", requires = "random", value_parser = clap::value_parser!(u64).range(0..=1_000_000_000))]
+    first_frame: u64,
     /// With --random: keep the first so many frames of each set as frames/SET-NUMBER.png,
     /// and what was drawn for them as frames/SET.csv
     #[arg(long, value_name = "K", default_value = "0", requires_all = ["random", "out"])]

@@ -1,6 +1,7 @@
 //! `truebead accuracy --random`: frames whose every parameter is drawn.
 
 use std::io::Cursor;
+use std::ops::Range;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
@@ -27,19 +28,20 @@ const ALL: &str = "all";
 pub fn judge(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
     let sets = named(&args.random)?;
     let frames = args.frames.unwrap_or(FRAMES);
+    let first = args.first_frame;
     if let Some(out) = &args.out {
         output::make_folder(out)?;
         if args.keep_frames > 0 {
             let folder = out.join("frames");
             output::make_folder(&folder)?;
-            sets.iter().try_for_each(|set| keep(set, args.keep_frames, &folder))?;
+            sets.iter().try_for_each(|set| keep(set, first..first + args.keep_frames, &folder))?;
         }
     }
     let total = frames * u64::try_from(sets.len()).unwrap_or(u64::MAX);
     let progress = Mutex::new(Progress::new("measuring", "frames", Some(total), voice.quiet));
     let mut all = Vec::new();
     for set in &sets {
-        let outcomes: Result<Vec<DrawnOutcome>> = (0..frames)
+        let outcomes: Result<Vec<DrawnOutcome>> = (first..first + frames)
             .into_par_iter()
             .map(|number| {
                 let outcome = measure(&set.take(number)?, number);
@@ -95,12 +97,13 @@ fn measure(drawn: &DrawnFrame, number: u64) -> DrawnOutcome {
 }
 
 /// Keeps the first frames of a set, and a table of what was drawn and measured.
-fn keep(set: &DrawnSet, count: u64, folder: &Path) -> Result<()> {
+fn keep(set: &DrawnSet, numbers: Range<u64>, folder: &Path) -> Result<()> {
     let mut table = csv::Writer::from_writer(Vec::new());
-    for number in 0..count {
+    let first = numbers.start;
+    for number in numbers {
         let drawn = set.take(number)?;
         let outcome = measure(&drawn, number);
-        if number == 0 {
+        if number == first {
             let names = drawn.parameters.iter().map(|parameter| parameter.name);
             let heads = ["file", "status", "width_px", "sigma_px", "truth_px"];
             table.write_record(heads.into_iter().chain(names))?;
