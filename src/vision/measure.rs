@@ -317,15 +317,13 @@ impl Work {
         {
             return textured;
         }
-        if !self.may_be_more_than_steps() {
-            return Ok(found);
+        if self.may_be_more_than_steps()
+            && let Ok(fits) = self.find_rough(strip, range)
+            && self.explains_more(&fits)
+        {
+            return self.take_rough(&fits, strip, view, surface);
         }
-        match self.find_rough(strip, range) {
-            Ok(fits) if self.explains_more(&fits) => self.take_rough(&fits, strip, view, surface),
-            // One of the two edges may be a rib's.
-            Err(ambiguous @ Reject::Ambiguous { .. }) if self.is_lopsided() => Err(ambiguous),
-            _ => Ok(found),
-        }
+        Ok(found)
     }
 
     /// Measures edges that are blurred steps.

@@ -10,7 +10,7 @@ use crate::vision::rough::RoughFit;
 const FEW_GAPS: f64 = 0.06;
 /// Contrast of an edge as a fraction of the other's below which it may be a rib's, and
 /// the distance at which another edge is not the same \[px\].
-const LOPSIDED: f64 = 0.8;
+const LOPSIDED: f64 = 0.6;
 const ELSEWHERE_PX: f64 = 3.0;
 /// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a
 /// wide flank.
@@ -37,12 +37,8 @@ impl Work {
         if self.way == Way::CutOff {
             return false;
         }
-        self.may_be_of_another_kind() || self.is_lopsided()
-    }
-
-    /// Whether an edge may be another one than a blurred step: a groove, bays, a wide flank.
-    fn may_be_of_another_kind(&self) -> bool {
-        self.is_refined() || self.is_beside_groove || self.is_wide() || self.has_gaps()
+        let is_other = self.is_refined() || self.is_beside_groove || self.is_wide();
+        is_other || self.has_gaps() || self.is_lopsided()
     }
 
     /// Whether edges were located line by line.
@@ -76,7 +72,7 @@ impl Work {
     }
 
     /// Whether one edge is much fainter than the other, as a rib's is.
-    pub(super) fn is_lopsided(&self) -> bool {
+    fn is_lopsided(&self) -> bool {
         let [left, right] = self.contrasts;
         left.min(right) < LOPSIDED * left.max(right)
     }
@@ -103,7 +99,7 @@ impl Work {
         if self.is_lopsided() && self.is_elsewhere() || self.are_parts_of_flanks(fits) {
             return true;
         }
-        if !self.may_be_of_another_kind() || self.is_wider(fits) {
+        if self.is_wider(fits) {
             return false;
         }
         let two_levels = are_two_levels(fits);
