@@ -18,9 +18,6 @@ const LEAST_LINES: usize = 8;
 /// from noise.
 const TOLD: f64 = 0.25;
 
-/// Standard deviation of normal numbers over the median of their magnitudes.
-const PER_MEDIAN: f64 = 1.4826;
-
 /// Places beside the edge within which a narrow groove lies \[px\].
 const GROOVE_PX: usize = 9;
 /// By how much what lies beyond a groove is brighter at least: a fraction of the
@@ -99,22 +96,12 @@ impl Ground {
         noise: f64,
     ) -> Option<Pattern> {
         let count = side.places.len();
-        if count < LEAST_LINES {
-            return None;
-        }
-        self.read(strip, side);
-        let mut variances = [0.0_f32; COLUMNS];
-        let mut columns = 0;
-        for (column, variance) in self.columns.chunks_exact(count).zip(&mut variances) {
+        let mean_square = |column: &mut [f64]| {
             let squares: f64 = column.iter().map(|value| value * value).sum();
-            *variance = narrow(squares / float(count - 2));
-            columns += 1;
-        }
-        let variance = f64::from(rank::median(&mut variances[..columns])?) - noise * noise;
-        (variance > TOLD * noise * noise).then(|| Pattern {
-            size_grey: variance.sqrt(),
-            mean_variance: self.variance_of_mean(count, noise),
-        })
+            Some(squares / float(count - 2))
+        };
+        let size_grey = self.spread(strip, side, noise, mean_square)?;
+        Some(Pattern { size_grey, mean_variance: self.variance_of_mean(count, noise) })
     }
 
     /// Standard deviation of the texture along a side, without the pixels' noise
@@ -126,22 +113,35 @@ impl Ground {
         side: &Side<'_>,
         noise: f64,
     ) -> Option<f64> {
+        self.spread(strip, side, noise, |column| {
+            for value in column.iter_mut() {
+                *value = value.abs();
+            }
+            rank::median(column).map(|median| (rank::SIGMA_PER_MEDIAN * median).powi(2))
+        })
+    }
+
+    /// Standard deviation along a side without the pixels' noise \[grey levels\], from the
+    /// median of the columns' variances.
+    fn spread<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        side: &Side<'_>,
+        noise: f64,
+        variance_of: impl Fn(&mut [f64]) -> Option<f64>,
+    ) -> Option<f64> {
         let count = side.places.len();
         if count < LEAST_LINES {
             return None;
         }
         self.read(strip, side);
-        let mut spreads = [0.0_f32; COLUMNS];
+        let mut variances = [0.0_f32; COLUMNS];
         let mut columns = 0;
-        for (column, spread) in self.columns.chunks_exact_mut(count).zip(&mut spreads) {
-            for value in column.iter_mut() {
-                *value = value.abs();
-            }
-            *spread = narrow(PER_MEDIAN * rank::median(column)?);
+        for (column, variance) in self.columns.chunks_exact_mut(count).zip(&mut variances) {
+            *variance = narrow(variance_of(column)?);
             columns += 1;
         }
-        let spread = f64::from(rank::median(&mut spreads[..columns])?);
-        let variance = spread * spread - noise * noise;
+        let variance = f64::from(rank::median(&mut variances[..columns])?) - noise * noise;
         (variance > TOLD * noise * noise).then(|| variance.sqrt())
     }
 

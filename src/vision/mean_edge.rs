@@ -241,7 +241,7 @@ impl MeanEdge {
         let samples = [weights.on_ground(&ground), weights.on_bead(&bead)];
         let samples = samples.map(|of| of.over(found.step));
         let shift = samples[0].shift() + samples[1].shift();
-        self.gather(scene, &weights, (contrast, found.step), shift);
+        self.gather(scene, &weights, &found, contrast, shift);
         (contrast > 0.0).then_some(MeanFit { samples, contrast, bead_grey })
     }
 
@@ -317,7 +317,8 @@ impl MeanEdge {
         &mut self,
         scene: &Scene<'_, T>,
         weights: &Weights,
-        (height, step): (f64, f64),
+        found: &Descent,
+        contrast: f64,
         shift: f64,
     ) {
         self.lines.clear();
@@ -332,13 +333,13 @@ impl MeanEdge {
                     aside += weight * scene.grey(row, at + off);
                 }
             }
-            let aside = aside / step / float(to - from) - shift;
+            let aside = aside / found.step / float(to - from) - shift;
             positions.push((middle, scene.inwards() * aside));
         }
         let squares: f64 = positions.iter().map(|(_, aside)| aside * aside).sum();
         let variance = squares / float(positions.len().max(1));
         self.lines.extend(positions.into_iter().map(|(middle, aside)| {
-            Some(Located { at: middle + aside, variance, height, share: 1.0 })
+            Some(Located { at: middle + aside, variance, height: contrast, share: 1.0 })
         }));
     }
 }

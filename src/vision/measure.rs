@@ -98,8 +98,6 @@ struct Work {
     /// Standard deviation of the pattern that the ground has on both sides, as a
     /// fraction of the contrast; 0 where one side has none.
     pattern_share: f64,
-    /// The same of the texture that the bead has beside both edges.
-    texture_share: f64,
     contrasts: [f64; 2],
     scatter: Vec<f64>,
     middles: Vec<f64>,
@@ -139,7 +137,6 @@ impl Measurer {
             way: Way::Steps,
             is_beside_groove: false,
             pattern_share: 0.0,
-            texture_share: 0.0,
             contrasts: [0.0; 2],
             scatter: Vec::new(),
             middles: Vec::new(),
@@ -310,10 +307,7 @@ impl Work {
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
         let knows_texture = self.left.knows_texture() && self.right.knows_texture();
-        let may_be_textured = self.pattern_share.max(self.texture_share) > 0.0;
-        if may_be_textured
-            && !knows_texture
-            && let Some(textured) = self.measure_textured(strip, range, view, surface)
+        if !knows_texture && let Some(textured) = self.measure_textured(strip, range, view, surface)
         {
             return textured;
         }

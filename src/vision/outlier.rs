@@ -28,7 +28,7 @@ pub fn sort_out(edges: &mut [Option<Located>], least_px: f64, memory: &mut Vec<f
     }
     let sizes = &mut places[..sizes];
     let Some(median) = rank::median(sizes) else { return 0.0 };
-    let sigma = 1.4826 * median;
+    let sigma = rank::SIGMA_PER_MEDIAN * median;
     let limit = least_px.max(MANY_SIGMA * sigma);
     for (edge, deviation) in edges.iter_mut().zip(deviations) {
         if deviation.abs() > limit {

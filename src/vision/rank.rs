@@ -3,6 +3,9 @@
 
 use std::cmp::Ordering;
 
+/// Standard deviation of normal numbers over the median of their magnitudes.
+pub const SIGMA_PER_MEDIAN: f64 = 1.4826;
+
 /// Numbers that have an order.
 pub trait Ordered: Copy {
     /// The total order of IEEE 754.

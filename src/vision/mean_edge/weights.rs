@@ -8,9 +8,8 @@ use super::super::step::StepTable;
 use super::{MIN_HALF_PX, WINDOW};
 
 /// Standard deviations of the ground's level within which that beside an edge is
-/// ground's, and how many medians of what levels are off by are one.
+/// ground's.
 const UNLIKE: f64 = 5.0;
-const PER_MEDIAN: f64 = 1.4826;
 /// The same as a fraction of the step: a flank is no blurred step to the last grey level.
 const NEARLY: f64 = 0.05;
 /// Places of a window that tell how far a pattern moves it.
@@ -90,7 +89,7 @@ impl Weights {
         let mut levels: Vec<f32> = levels.map(narrow).collect();
         let Some(middle) = rank::median(&mut levels) else { return true };
         let mut off: Vec<f32> = levels.iter().map(|value| (value - middle).abs()).collect();
-        let spread = PER_MEDIAN * rank::median(&mut off).map_or(0.0, f64::from);
+        let spread = rank::SIGMA_PER_MEDIAN * rank::median(&mut off).map_or(0.0, f64::from);
         (level - f64::from(middle)).abs() < UNLIKE * spread + NEARLY * step
     }
 
@@ -128,8 +127,11 @@ pub(super) fn product(weights: &[f64], values: &[f64]) -> f64 {
 /// What places without an edge make of an edge's position.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Samples {
+    /// Sum of the squares of what they make of it.
     pub(super) squares: f64,
+    /// Sum of that times how it changes where the window moves inwards.
     pub(super) drifts: f64,
+    /// Their number.
     pub(super) count: f64,
 }
 

@@ -130,26 +130,16 @@ impl Work {
         let noise = f64::from(self.noise);
         self.is_beside_groove = false;
         let mut strengths = [0.0_f64; 2];
-        let mut textures = [0.0_f64; 2];
         let sides = [(&mut self.left, -1.0), (&mut self.right, 1.0)];
-        for ((((tracer, outwards), contrast), strength), texture) in
-            sides.into_iter().zip(self.contrasts).zip(&mut strengths).zip(&mut textures)
+        for (((tracer, outwards), contrast), strength) in
+            sides.into_iter().zip(self.contrasts).zip(&mut strengths)
         {
             tracer.ground_variance = 0.0;
             if !tracer.is_on_ground {
                 continue;
             }
-            self.places.clear();
-            self.places.extend(
-                tracer
-                    .edges()
-                    .iter()
-                    .zip(&self.lines)
-                    .filter_map(|(edge, line)| Some(Place { rows: *line, at: edge.as_ref()?.at })),
-            );
+            place(tracer, &self.lines, &mut self.places);
             let side = Side { places: &self.places, outwards, blur_px: tracer.blur_px };
-            let inwards = Side { outwards: -outwards, ..side };
-            *texture = self.ground.texture(strip, &inwards, noise).unwrap_or(0.0) / contrast;
             self.is_beside_groove |= ground::rises(strip, &side, noise, contrast);
             let Some(pattern) = self.ground.pattern(strip, &side, noise) else { continue };
             *strength = pattern.size_grey / contrast;
@@ -159,7 +149,6 @@ impl Work {
                 tracer.ground_variance = pattern.mean_variance * px_per_grey * px_per_grey;
             }
         }
-        self.texture_share = textures[0].min(textures[1]);
         self.pattern_share = strengths[0].min(strengths[1]);
         let (got, limit) = (of_both(strengths[0], strengths[1]), STRONGEST_PATTERN);
         if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
@@ -235,6 +224,13 @@ impl Work {
         }
         Ok(())
     }
+}
+
+/// Where an edge lies on the caliper lines that show it.
+pub(super) fn place(tracer: &Tracer, lines: &[(usize, usize)], places: &mut Vec<Place>) {
+    let edges = tracer.edges().iter().zip(lines);
+    places.clear();
+    places.extend(edges.filter_map(|(edge, &rows)| Some(Place { rows, at: edge.as_ref()?.at })));
 }
 
 /// Share of the rows from which an edge must come.

@@ -1,5 +1,6 @@
 //! Beads that have a texture, or lie on ground that has a pattern.
 
+use super::judge::place;
 use super::{NEED_SHARE, Work, even};
 use crate::calib::SurfaceMap;
 use crate::vision::coarse::LinePair;
@@ -27,27 +28,22 @@ const TOLD: f64 = 1.25;
 
 impl Work {
     /// Standard deviation of the pattern that the ground has on both sides of a pair of
-    /// lines \[grey levels\]. `None` where one side has none: what is on one side alone is
-    /// a groove or a neighbour.
-    pub(super) fn ground_pattern<T: Grey>(
-        &mut self,
-        strip: &Strip<'_, T>,
-        pair: &LinePair,
-    ) -> Option<f64> {
+    /// lines \[grey levels\]; 0 where one side has none: what is on one side alone is a
+    /// groove or a neighbour.
+    pub(super) fn ground_pattern<T: Grey>(&mut self, strip: &Strip<'_, T>, pair: &LinePair) -> f64 {
         let noise = f64::from(self.noise);
         let mut least = f64::INFINITY;
         let sides = self.mean_edges.iter_mut().zip(&pair.sides);
         for ((edge, line), bead_after) in sides.zip([true, false]) {
             let scene = scene(strip, &self.lines, pair, bead_after);
-            least = least.min(edge.pattern(&scene, line)?);
+            least = least.min(edge.pattern(&scene, line).unwrap_or(0.0));
         }
         let variance = least * least;
-        (variance > TOLD * noise * noise).then(|| (variance - noise * noise).sqrt())
+        if variance > TOLD * noise * noise { (variance - noise * noise).sqrt() } else { 0.0 }
     }
 
     /// Measures a bead that was measured already, where it or the ground has a pattern.
     /// `None` where neither has, or a weak one, or no lines are found.
-    #[cold]
     #[inline(never)]
     pub(super) fn measure_textured<T: Grey>(
         &mut self,
@@ -56,22 +52,42 @@ impl Work {
         view: &View,
         surface: &SurfaceMap,
     ) -> Option<Result<WidthMeasurement, Reject>> {
+        let is_textured = self.is_textured_between_steps(strip);
+        if !is_textured && self.pattern_share == 0.0 {
+            return None;
+        }
         let pair = self.find_lines(strip, range).ok()?;
-        let pattern = self.ground_pattern(strip, &pair).unwrap_or(0.0);
+        let pattern = self.ground_pattern(strip, &pair);
         let contrast = self.contrasts[0].min(self.contrasts[1]);
-        if pattern < NOTABLE * contrast && self.texture_share < NOTABLE_TEXTURE {
+        if !is_textured && pattern < NOTABLE * contrast {
             return None;
         }
         let found = self.measure_patterned((&pair, pattern), strip, view, surface);
         if let Err(Reject::NoPair { .. }) = found { None } else { Some(found) }
     }
 
-    /// Whether the bead between two lines has a texture beside both.
-    pub(super) fn is_textured<T: Grey>(&mut self, strip: &Strip<'_, T>, pair: &LinePair) -> bool {
+    /// Whether the bead between two blurred steps has a texture beside both.
+    fn is_textured_between_steps<T: Grey>(&mut self, strip: &Strip<'_, T>) -> bool {
+        let noise = f64::from(self.noise);
+        let sides = [(&self.left, 1.0), (&self.right, -1.0)];
+        sides.into_iter().zip(self.contrasts).all(|((tracer, inwards), contrast)| {
+            place(tracer, &self.lines, &mut self.places);
+            let blur_px = tracer.blur_px;
+            let side = Side { places: &self.places, outwards: inwards, blur_px };
+            let texture = self.ground.texture(strip, &side, noise);
+            texture.is_some_and(|texture| texture > NOTABLE_TEXTURE * contrast)
+        })
+    }
+
+    /// The same between two lines.
+    pub(super) fn is_textured_between_lines<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        pair: &LinePair,
+    ) -> bool {
         let middle = 0.5 * (float(strip.along) - 1.0);
         let noise = f64::from(self.noise);
-        let sides = pair.sides.iter().zip([1.0, -1.0]);
-        sides.into_iter().all(|(line, inwards)| {
+        pair.sides.iter().zip([1.0, -1.0]).all(|(line, inwards)| {
             self.places.clear();
             self.places.extend(self.lines.iter().map(|&rows| {
                 let off = pool::middle(rows) - middle;

@@ -41,9 +41,8 @@ impl Work {
     ) -> Result<WidthMeasurement, Reject> {
         let pair = self.find_lines(strip, range)?;
         let pattern = self.ground_pattern(strip, &pair);
-        if pattern.is_some() || self.is_textured(strip, &pair) {
-            let scene = (&pair, pattern.unwrap_or(0.0));
-            let found = self.measure_patterned(scene, strip, view, surface);
+        if pattern > 0.0 || self.is_textured_between_lines(strip, &pair) {
+            let found = self.measure_patterned((&pair, pattern), strip, view, surface);
             if !matches!(found, Err(Reject::NoPair { .. })) {
                 return found;
             }
@@ -52,7 +51,7 @@ impl Work {
         if is_covered(refused) && fits.iter().any(has_grains) {
             return Err(*refused);
         }
-        check_pattern(pattern.unwrap_or(0.0), &fits)?;
+        check_pattern(pattern, &fits)?;
         self.take_rough(&fits, strip, view, surface)
     }
 
