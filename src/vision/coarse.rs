@@ -4,7 +4,7 @@
 //! an edge does not.
 
 use super::number::single;
-use super::pair::{RIVAL_SHARE, SAME_WIDTH, SEAM_SHARE};
+use super::pair::{RIVAL_SHARE, SEAM_SHARE, is_narrower};
 use super::rank;
 use super::rough::whole;
 use super::strip::{Grey, Strip};
@@ -145,7 +145,7 @@ impl Coarse {
             if pair.width_px() < other.width_px() { (pair, other) } else { (other, pair) };
         let [left, right] = outer.sides;
         let is_within = inner.sides[0].at >= left.at && inner.sides[1].at <= right.at;
-        let narrower = inner.width_px() < (1.0 - SAME_WIDTH) * outer.width_px();
+        let narrower = is_narrower(inner.width_px(), outer.width_px());
         if pair.bright != other.bright || !is_within || !narrower {
             return false;
         }

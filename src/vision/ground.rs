@@ -43,6 +43,8 @@ pub struct Side<'a> {
     pub outwards: f64,
     /// Blur of the edge \[px\].
     pub blur_px: f64,
+    /// Distance of the next edge, whose flank is no pattern \[px\].
+    pub room_px: f64,
 }
 
 impl Side<'_> {
@@ -151,7 +153,11 @@ impl Ground {
         let last = float(strip.across - 1);
         self.columns.clear();
         for column in 0..COLUMNS {
-            let off = side.outwards * (first + STEP_PX * float(column));
+            let distance = first + STEP_PX * float(column);
+            if distance > side.room_px - first {
+                return;
+            }
+            let off = side.outwards * distance;
             if side.places.iter().any(|place| place.at + off < 0.0 || place.at + off > last) {
                 return;
             }

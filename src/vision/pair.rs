@@ -15,8 +15,9 @@ pub const SEAM_SHARE: f32 = 0.64;
 /// Strength of a pair within another one, as a share of the other's, from which on it
 /// fits as well: a rib of 81 % of the edges.
 pub const RIVAL_SHARE: f32 = 0.9;
-/// Share of the width by which two pairs differ at least.
-pub const SAME_WIDTH: f32 = 0.03;
+/// Share of the width by which two pairs differ at least, and how many pixels are enough.
+const SAME_WIDTH: f32 = 0.03;
+const SAME_PX: f32 = 5.0;
 /// Share of the bands in which a gap is seen, in that of the bead's edges.
 const WHOLE: f64 = 0.85;
 
@@ -85,6 +86,11 @@ pub fn find(
     Some(Pair { rival_px: rival.map(|rival| rival.width_px), ..best })
 }
 
+/// Whether a pair is so much narrower than another that it is not the same.
+pub fn is_narrower(inner_px: f32, outer_px: f32) -> bool {
+    inner_px < outer_px - (SAME_WIDTH * outer_px).min(SAME_PX)
+}
+
 /// Step of the weaker one of two edges \[grey levels\].
 fn weaker((left, right): (&Contour, &Contour)) -> f32 {
     left.step.min(right.step)
@@ -97,7 +103,7 @@ fn is_within(inner: &Pair, outer: &Pair, (lefts, rights): (&Contours, &Contours)
     let least = SEAM_SHARE * outer.step;
     let within =
         |line: &&Contour| line.step >= least && in_order(left, line) && in_order(line, right);
-    let narrower = inner.width_px < (1.0 - SAME_WIDTH) * outer.width_px;
+    let narrower = is_narrower(inner.width_px, outer.width_px);
     let ends_within = inner.left == outer.left
         && within(&&rights.all()[inner.right])
         && lefts.all().iter().any(|line| within(&line));

@@ -8,6 +8,11 @@ use crate::vision::rough::RoughFit;
 
 /// Share of an edge's rows that may be sorted out: more are bays, or grains.
 const FEW_GAPS: f64 = 0.06;
+/// Narrowest bead whose level is read free of its flanks by rough edges \[px\].
+const NARROW_PX: f32 = 40.0;
+/// Contrast of a rough edge over that of the blurred step below which it is another edge:
+/// holes within the bead leave 0.8.
+const FAINTER: f64 = 0.7;
 /// Contrast of an edge as a fraction of the other's below which it may be a rib's, and
 /// the distance at which another edge is not the same \[px\].
 const LOPSIDED: f64 = 0.6;
@@ -63,6 +68,11 @@ impl Work {
         fits.iter().zip(self.contrasts).all(|(fit, step)| fit.contrast < HIGHER * step)
     }
 
+    /// Whether a rough edge is so much fainter than the blurred step that it is another.
+    fn is_fainter(&self, fits: &[RoughFit; 2]) -> bool {
+        fits.iter().zip(self.contrasts).any(|(fit, step)| fit.contrast < FAINTER * step)
+    }
+
     /// Whether the blurred steps are parts of flanks that are wider than any blur.
     fn are_parts_of_flanks(&self, fits: &[RoughFit; 2]) -> bool {
         let mut sides = fits.iter().zip(self.contrasts);
@@ -99,7 +109,7 @@ impl Work {
         if self.is_lopsided() && self.is_elsewhere() || self.are_parts_of_flanks(fits) {
             return true;
         }
-        if self.is_wider(fits) {
+        if self.is_wider(fits) || self.is_fainter(fits) {
             return false;
         }
         let two_levels = are_two_levels(fits);
@@ -113,7 +123,8 @@ impl Work {
         } else {
             // Grains here and there look like a groove in the mean over the gauge.
             let is_covered = self.left.is_covered() || self.right.is_covered();
-            let has_bays = two_levels && self.has_gaps() && self.is_no_higher(fits);
+            let has_room = self.width_px > NARROW_PX;
+            let has_bays = two_levels && has_room && self.has_gaps() && self.is_no_higher(fits);
             !self.is_wide() && (has_bays || hidden && !is_covered)
         }
     }

@@ -139,7 +139,8 @@ impl Work {
                 continue;
             }
             place(tracer, &self.lines, &mut self.places);
-            let side = Side { places: &self.places, outwards, blur_px: tracer.blur_px };
+            let blur_px = tracer.blur_px;
+            let side = Side { places: &self.places, outwards, blur_px, room_px: f64::INFINITY };
             self.is_beside_groove |= ground::rises(strip, &side, noise, contrast);
             let Some(pattern) = self.ground.pattern(strip, &side, noise) else { continue };
             *strength = pattern.size_grey / contrast;

@@ -7,6 +7,7 @@ use super::{NEED_SHARE, OFF_PX, Way, Work};
 use crate::vision::covered;
 use crate::vision::motion::BlurShapes;
 use crate::vision::noise;
+use crate::vision::number::narrow;
 use crate::vision::rank;
 use crate::vision::reject::Reject;
 use crate::vision::saturated;
@@ -19,6 +20,9 @@ use crate::vision::trace::{Scene, Tracer};
 const LINE_OFF_PX: f64 = 0.75;
 /// Ground on either side of the bead that its noise is taken from \[px\].
 const BESIDE_PX: f32 = 12.0;
+/// Distance of an edge's median from its contour's that makes it another \[px\]: grains of
+/// 12 px beside an edge draw its contour along by less.
+const ELSEWHERE_PX: f32 = 14.0;
 /// Share by which the blur of one edge differs from the other's.
 const DIFFERENT: f64 = 0.04;
 
@@ -76,6 +80,10 @@ impl Work {
                 let bead = covered::Bead { scenes, candidates, bright: pair.bright };
                 let tracers = [&mut self.left, &mut self.right];
                 bead.uncover(tracers, table, blur, &mut self.parallel);
+                let contours = [(&self.left, lefts.as_slice()), (&self.right, rights)];
+                if let Some([one, other]) = widths_apart(contours, &mut self.memory) {
+                    return Err(self.ambiguous(one, other));
+                }
             }
             self.is_lost = self.one_is_lost();
             let found = self.left.is_located() && self.right.is_located();
@@ -123,6 +131,22 @@ fn common_blur(seen: [Option<(f64, f64)>; 2]) -> Option<(f64, f64)> {
     }
     let blur = sum / weights;
     (weights > 0.0).then_some((blur, DIFFERENT * blur))
+}
+
+/// Width between edges of which one was uncovered elsewhere than where its contour runs, and
+/// between the contours \[px\]: a seam or a rib may have been taken for the edge. `None`
+/// where both run along their contours.
+fn widths_apart(sides: [(&Tracer, &[Option<f32>]); 2], memory: &mut Vec<f32>) -> Option<[f32; 2]> {
+    let [left, right] = sides.map(|(tracer, contour)| {
+        memory.clear();
+        memory.extend(contour.iter().flatten());
+        let contour = rank::median(memory).unwrap_or(f32::NAN);
+        let found = narrow(tracer.middle());
+        let is_elsewhere = tracer.is_covered() && (found - contour).abs() > ELSEWHERE_PX;
+        [if is_elsewhere { found } else { contour }, contour]
+    });
+    let [uncovered, contours] = [0, 1].map(|of| right[of] - left[of]);
+    (uncovered != contours).then_some([uncovered, contours])
 }
 
 /// Columns of the bead and a little beside it.

@@ -15,6 +15,11 @@ use crate::vision::width::WidthMeasurement;
 /// Strongest pattern of the ground, as a fraction of the contrast: one of a third is
 /// measured, of a stronger one parts are taken for the bead.
 const STRONGEST: f64 = 0.37;
+/// The same where no mean profile tells the edges. Beside beads of real concrete, which
+/// have a texture themselves, other beads and grooves have up to 0.464; a pattern beside a
+/// plain bead is none of those.
+const STRONGEST_OF_SAME: f64 = 0.48;
+const STRONGEST_BESIDE_PLAIN: f64 = 0.2;
 /// Weakest pattern, as a fraction of the contrast, beside which blurred steps are not
 /// good enough: one of less draws them outwards by hardly 0.02 px.
 const NOTABLE: f64 = 0.06;
@@ -63,17 +68,21 @@ impl Work {
             return None;
         }
         let found = self.measure_patterned((&pair, pattern), strip, view, surface);
-        if let Err(Reject::NoPair { .. }) = found { None } else { Some(found) }
+        if !matches!(found, Err(Reject::NoPair { .. })) {
+            return Some(found);
+        }
+        check_pattern(pattern / contrast, is_textured).err().map(Err)
     }
 
     /// Whether the bead between two blurred steps has a texture beside both.
     fn is_textured_between_steps<T: Grey>(&mut self, strip: &Strip<'_, T>) -> bool {
         let noise = f64::from(self.noise);
         let sides = [(&self.left, 1.0), (&self.right, -1.0)];
+        let room_px = self.right.middle() - self.left.middle();
         sides.into_iter().zip(self.contrasts).all(|((tracer, inwards), contrast)| {
             place(tracer, &self.lines, &mut self.places);
             let blur_px = tracer.blur_px;
-            let side = Side { places: &self.places, outwards: inwards, blur_px };
+            let side = Side { places: &self.places, outwards: inwards, blur_px, room_px };
             let texture = self.ground.texture(strip, &side, noise);
             texture.is_some_and(|texture| texture > NOTABLE_TEXTURE * contrast)
         })
@@ -93,7 +102,12 @@ impl Work {
                 let off = pool::middle(rows) - middle;
                 Place { rows, at: f64::from(line.at) + off * f64::from(line.slope) }
             }));
-            let side = Side { places: &self.places, outwards: inwards, blur_px: LARGE_BLUR_PX };
+            let side = Side {
+                places: &self.places,
+                outwards: inwards,
+                blur_px: LARGE_BLUR_PX,
+                room_px: pair.width_px().into(),
+            };
             let texture = self.ground.texture(strip, &side, noise);
             texture.is_some_and(|texture| texture > NOTABLE_TEXTURE * f64::from(line.step))
         })
@@ -144,6 +158,13 @@ impl Work {
         self.check_border(strip.across)?;
         self.width_on(view, surface)
     }
+}
+
+/// Refuses a bead whose ground has a pattern, a fraction of the contrast, and whose mean
+/// profile tells no edges: parts of the pattern look like bead, and like grooves.
+pub fn check_pattern(got: f64, is_textured: bool) -> Result<(), Reject> {
+    let limit = if is_textured { STRONGEST_OF_SAME } else { STRONGEST_BESIDE_PLAIN };
+    if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
 }
 
 /// What is looked at for one edge of a pair.

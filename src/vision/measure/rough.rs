@@ -1,6 +1,7 @@
 //! Beads whose edges are no blurred steps: torn ones, grooves, texture.
 
 use super::choice::has_grains;
+use super::patterned::check_pattern;
 use super::{NEED_SHARE, Work, even};
 use crate::calib::SurfaceMap;
 use crate::vision::coarse::LinePair;
@@ -17,9 +18,6 @@ const LINE_SLACK: f32 = 1.4;
 /// Widest blur of a rough edge \[px\]: what lies outside is looked for within 20 px, and
 /// a flank of three blurs must end before.
 pub const WIDEST_ROUGH_PX: f64 = 6.3;
-/// Strongest pattern beside rough edges, as a fraction of the contrast: beside beads of
-/// real concrete, other beads and grooves have up to 0.464.
-const STRONGEST_BESIDE_ROUGH: f64 = 0.48;
 /// Part of the width beside either edge where its flank may be \[of the width\]: the
 /// bead's texture is taken from between.
 const TEXTURE_MARGIN: f32 = 0.15;
@@ -41,17 +39,22 @@ impl Work {
     ) -> Result<WidthMeasurement, Reject> {
         let pair = self.find_lines(strip, range)?;
         let pattern = self.ground_pattern(strip, &pair);
-        if pattern > 0.0 || self.is_textured_between_lines(strip, &pair) {
+        let is_textured = self.is_textured_between_lines(strip, &pair);
+        if pattern > 0.0 || is_textured {
             let found = self.measure_patterned((&pair, pattern), strip, view, surface);
             if !matches!(found, Err(Reject::NoPair { .. })) {
                 return found;
             }
         }
+        // Texture looks like seams and ribs; within a plain bead they are.
+        if !is_textured && matches!(refused, Reject::Ambiguous { .. }) {
+            return Err(*refused);
+        }
         let fits = self.fit_rough(strip, &pair)?;
         if is_covered(refused) && fits.iter().any(has_grains) {
             return Err(*refused);
         }
-        check_pattern(pattern, &fits)?;
+        check_pattern(pattern / fits[0].contrast.min(fits[1].contrast), is_textured)?;
         self.take_rough(&fits, strip, view, surface)
     }
 
@@ -151,14 +154,6 @@ impl Work {
         let rival = self.pairs.iter().skip(1).find(|other| self.coarse.are_rivals(pair, other));
         rival.map_or(Ok(()), |rival| Err(self.ambiguous(pair.width_px(), rival.width_px())))
     }
-}
-
-/// Refuses a bead beside a pattern that is as strong as its edges. `pattern` is its
-/// standard deviation \[grey levels\]: parts of it look like bead, and like grooves.
-fn check_pattern(pattern: f64, fits: &[RoughFit; 2]) -> Result<(), Reject> {
-    let got = pattern / fits[0].contrast.min(fits[1].contrast);
-    let limit = STRONGEST_BESIDE_ROUGH;
-    if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
 }
 
 /// Whether a frame was refused for what hides its edges, which may be grains.

@@ -15,6 +15,9 @@ const LEAST_PX: f64 = 8.0;
 const ENOUGH_PX: f64 = 12.0;
 /// A bend is believed from so many standard deviations on.
 const SURE: f64 = 4.0;
+/// Slope at the far end of a parabola, as a fraction of that at the edge, from which on it
+/// turns back: light that falls off does not, a rib beside the edge does.
+const TURNS_BACK: f64 = 0.3;
 /// Unit of distances, so that the equations are well scaled \[px\].
 const UNIT_PX: f64 = 10.0;
 
@@ -68,14 +71,13 @@ impl Overlay {
         }
         let solved = normal.solve()?;
         let covariance = solved.covariance() * noise * noise;
-        let bend = solved.unknowns[2];
-        let sure = bend * bend > SURE * SURE * covariance[(2, 2)];
+        let (slope, bend) = (solved.unknowns[1], solved.unknowns[2]);
+        let slope_at_end = slope + 2.0 * bend * end / UNIT_PX;
+        let turns_back = -slope_at_end * slope.signum() > TURNS_BACK * slope.abs();
+        let sure = bend * bend > SURE * SURE * covariance[(2, 2)] && !turns_back;
         sure.then(|| Beside {
             extent: end,
-            shading: Shading {
-                slope: solved.unknowns[1] / UNIT_PX,
-                bend: bend / (UNIT_PX * UNIT_PX),
-            },
+            shading: Shading { slope: slope / UNIT_PX, bend: bend / (UNIT_PX * UNIT_PX) },
             doubt: (covariance[(0, 0)] - noise * noise / rows).max(0.0),
         })
     }
