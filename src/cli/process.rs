@@ -1,5 +1,6 @@
 //! `truebead process`: measures recorded frames offline.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -90,9 +91,23 @@ pub fn run(args: &ProcessArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     let overlays = overlays.transpose()?;
     let robot_z = recorded.robot_z.as_ref();
     let roughness = RoughnessEstimator::default();
-    let bench = Bench { loaded: &loaded, robot_z, progress, log, roughness, edges, overlays };
-    let summary = bench.measure_all(recorded.source, &stop)?;
-    Ok(conclude(args, &summary, &loaded))
+    let refusals = BTreeMap::new();
+    let bench =
+        Bench { loaded: &loaded, robot_z, progress, log, roughness, edges, overlays, refusals };
+    let measured = bench.measure_all(recorded.source, &stop)?;
+    Ok(conclude(args, &measured, &loaded))
+}
+
+/// The first frame that was refused with a status, and why.
+struct Refusal {
+    frame: u64,
+    why: Reject,
+}
+
+/// What was measured, and the first refusal of each status.
+struct Measured {
+    summary: Summary,
+    refusals: BTreeMap<&'static str, Refusal>,
 }
 
 fn wrong_input(SourceError { source_name, what }: SourceError) -> WrongArguments {
@@ -108,6 +123,7 @@ struct Bench<'a> {
     roughness: RoughnessEstimator,
     edges: Option<EdgesWriter>,
     overlays: Option<OverlayWriter>,
+    refusals: BTreeMap<&'static str, Refusal>,
 }
 
 impl Bench<'_> {
@@ -117,7 +133,7 @@ impl Bench<'_> {
         mut self,
         mut source: Box<dyn FrameSource>,
         stop: &StopSignal,
-    ) -> anyhow::Result<Summary> {
+    ) -> anyhow::Result<Measured> {
         let (send, frames) = bounded(WAITING);
         let ending = AtomicBool::new(false);
         let failed = std::thread::scope(|scope| -> anyhow::Result<Option<SourceError>> {
@@ -152,7 +168,7 @@ impl Bench<'_> {
         if let Some(edges) = self.edges {
             edges.finish()?;
         }
-        Ok(summary)
+        Ok(Measured { summary, refusals: self.refusals })
     }
 
     fn measure(
@@ -167,7 +183,11 @@ impl Bench<'_> {
                 let surface = self.loaded.surface(robot_z);
                 let outcome = measurer
                     .measure(&frame, &surface)
-                    .inspect_err(|reject| tracing::info!("frame {}: {reject}", frame.seq))
+                    .inspect_err(|why| {
+                        tracing::info!("frame {}: {why}", frame.seq);
+                        let first = Refusal { frame: frame.seq, why: *why };
+                        self.refusals.entry(why.status()).or_insert(first);
+                    })
                     .map_err(|reject| reject.status());
                 self.roughness.frame(measurer, outcome.as_ref().ok(), &surface);
                 let roughness = self.roughness.estimate();
@@ -211,10 +231,17 @@ fn read(
     None
 }
 
-fn conclude(args: &ProcessArgs, summary: &Summary, loaded: &LoadedCell) -> ExitCode {
+fn conclude(
+    args: &ProcessArgs,
+    Measured { summary, refusals }: &Measured,
+    loaded: &LoadedCell,
+) -> ExitCode {
     say!("{} frames, {} measured", summary.frames, summary.measured);
-    for (reason, count) in &summary.rejected {
-        say!("  {count} {reason}");
+    for (status, count) in &summary.rejected {
+        say!("  {count} {status}");
+        if let Some(Refusal { frame, why }) = refusals.get(status) {
+            say!("    frame {frame}: {why}");
+        }
     }
     if let (Some(mean), Some(std)) = (summary.width_mean_mm, summary.width_std_mm) {
         say!("width {mean:.3} mm on average, standard deviation {std:.3} mm");

@@ -41,7 +41,7 @@ const MAX_SCATTER_PX: f64 = 1.5;
 /// as rough as they look, and what scatters more is no bead.
 const WHOLE_SCATTER_PX: f64 = 4.0;
 /// Share of the rows that counts as all.
-const WHOLE_SHARE: f64 = 0.95;
+pub(super) const WHOLE_SHARE: f64 = 0.95;
 /// The same where one edge was hidden and had to be located line by line.
 const LOST_SCATTER_PX: f64 = 0.5;
 

@@ -1,6 +1,6 @@
 //! Beads that have a texture, or lie on ground that has a pattern.
 
-use super::judge::place;
+use super::judge::{WHOLE_SHARE, place};
 use super::{NEED_SHARE, Work, even};
 use crate::calib::SurfaceMap;
 use crate::vision::coarse::LinePair;
@@ -48,7 +48,8 @@ impl Work {
     }
 
     /// Measures a bead that was measured already, where it or the ground has a pattern.
-    /// `None` where neither has, or a weak one, or no lines are found.
+    /// `None` where neither has, or a weak one, or no lines are found, and where the mean
+    /// profile tells no edges while the blurred steps show all along the bead.
     #[inline(never)]
     pub(super) fn measure_textured<T: Grey>(
         &mut self,
@@ -71,7 +72,9 @@ impl Work {
         if !matches!(found, Err(Reject::NoPair { .. })) {
             return Some(found);
         }
-        check_pattern(pattern / contrast, is_textured).err().map(Err)
+        let is_whole = self.left.used_share().min(self.right.used_share()) > WHOLE_SHARE;
+        let checked = check_pattern(pattern / contrast, is_textured);
+        checked.err().filter(|_| !is_whole).map(Err)
     }
 
     /// Whether the bead between two blurred steps has a texture beside both.
