@@ -109,7 +109,7 @@ impl Work {
         if self.is_lopsided() && self.is_elsewhere() || self.are_parts_of_flanks(fits) {
             return true;
         }
-        if self.is_wider(fits) || self.is_fainter(fits) {
+        if self.is_wider(fits) || self.is_elsewhere() && self.is_fainter(fits) {
             return false;
         }
         let two_levels = are_two_levels(fits);
