@@ -40,7 +40,7 @@ const INNER_SHARES: (f32, f32) = (0.5, 0.8);
 /// Lines of each sign that are looked at.
 const MAX_LINES: usize = 8;
 /// Difference of slope at which a pair of lines counts for 1/e.
-const SLOPE_DIFFERENCE: f32 = 0.2;
+const SLOPE_DIFFERENCE: f32 = 0.3;
 
 /// A line along which the grey steps.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -307,15 +307,18 @@ impl Work {
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
         let knows_texture = self.left.knows_texture() && self.right.knows_texture();
-        if !knows_texture && let Some(textured) = self.measure_textured(strip, range, view, surface)
+        let is_on_texture = knows_texture && self.pattern_share > 0.0;
+        if !is_on_texture && let Some(textured) = self.measure_textured(strip, range, view, surface)
         {
             return textured;
         }
         if self.may_be_more_than_steps()
             && let Ok(fits) = self.find_rough(strip, range)
-            && self.explains_more(&fits)
         {
-            return self.take_rough(&fits, strip, view, surface);
+            if self.explains_more(&fits) {
+                return self.take_rough(&fits, strip, view, surface);
+            }
+            self.check_flanks(&fits)?;
         }
         Ok(found)
     }

@@ -47,6 +47,12 @@ const FINE_FRACTION: f64 = 0.2;
 /// How likely a groove that does not show its depth must be to be looked at.
 const LIKELY_GROOVE: f64 = 0.25;
 
+/// Standard deviation of the place of an edge beside a narrow groove that its waves leave
+/// open, as a fraction of theirs and at most \[px\]: the mean over them is no Gaussian
+/// flank. Measured on 12,000 rendered beads.
+const GROOVE_WAVES: f64 = 0.1;
+const MOST_GROOVE_WAVES_PX: f64 = 0.1;
+
 /// Difference of the bead's level beside the edge from that farther inside, in standard
 /// deviations of what light does, from which on the former is taken, and the standard
 /// deviation of the shift that this makes, as a fraction of it.
@@ -169,9 +175,11 @@ impl RoughEdge {
         for at in &mut self.crossings.at {
             *at += narrow(shift);
         }
+        let waves = noise::roughness(&self.crossings).sqrt();
+        let of_waves = (GROOVE_WAVES * waves).min(MOST_GROOVE_WAVES_PX).powi(2);
         let of_shape = |shape: EdgeShape| {
             if is_groove_likely {
-                return shape.variance;
+                return shape.variance + of_waves;
             }
             shape.variance.max(noise.of_mean) + (SHIFT_FRACTION * shift).powi(2)
         };

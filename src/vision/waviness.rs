@@ -22,9 +22,6 @@ const LENGTHS: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 2.4];
 const FIRST_PX2: f64 = 2e-4;
 const RATIO: f64 = 2.0;
 const VARIANCES: usize = 18;
-/// Small waves are likelier than large ones beforehand, by this power of their
-/// variance.
-const SMALL_FIRST: f64 = 0.35;
 /// Points of the gauge for the integrals over it.
 const POINTS: usize = 40;
 /// Evidence that is believed, in standard deviations of what noise makes.
@@ -33,6 +30,41 @@ const BELIEVED: f64 = 4.0;
 const FREEDOM: f64 = 10.0;
 /// How likely a bent bead is to show a coefficient, in the density of waves at none.
 const BENT: f64 = 0.02;
+
+/// What kind of waves an edge has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Waves {
+    /// Those of a smooth edge. Their autocorrelation is that of a Matérn process of order
+    /// 3/2, which has a slope everywhere but is rougher than a Gaussian one.
+    Smooth,
+    /// Those of a torn edge, with the autocorrelation exp(−|d|/length).
+    Torn,
+}
+
+impl Waves {
+    /// Small waves are likelier than large ones beforehand, by this power of their
+    /// variance: it leaves the widths of rendered beads without bias.
+    fn small_first(self) -> f64 {
+        match self {
+            Self::Smooth => 0.35,
+            Self::Torn => 0.7,
+        }
+    }
+
+    fn correlation(self, lengths: f64) -> f64 {
+        match self {
+            Self::Smooth => (1.0 + 3f64.sqrt() * lengths) * (-3f64.sqrt() * lengths).exp(),
+            Self::Torn => (-lengths).exp(),
+        }
+    }
+
+    fn shares(self) -> &'static Shares {
+        match self {
+            Self::Smooth => &SMOOTH,
+            Self::Torn => &TORN,
+        }
+    }
+}
 
 /// Coefficients that tell of waves, by their order.
 #[derive(Debug, Clone, Copy, Default)]
@@ -53,7 +85,7 @@ impl Evidence {
 
     /// Variances that waves give to the midline's coefficients of the orders 1
     /// to 4 \[px²\]; `None` where noise explains all.
-    pub fn waves(&self) -> Option<[f64; CURVED]> {
+    pub fn waves(&self, kind: Waves) -> Option<[f64; CURVED]> {
         let (mut ratio, mut n) = (0.0, 0.0);
         for order in 0..ORDERS {
             ratio += self.squares[order] / self.noise[order].max(f64::MIN_POSITIVE);
@@ -65,10 +97,11 @@ impl Evidence {
         let mut sum = 0.0;
         let mut waves = [0.0; CURVED];
         let mut best = f64::NEG_INFINITY;
-        for shares in SHARES.iter() {
+        for shares in kind.shares() {
             let mut variance = FIRST_PX2;
             for _ in 0..VARIANCES {
-                let likelihood = self.log_likelihood(shares, variance);
+                let likelihood =
+                    self.log_likelihood(shares, variance) - kind.small_first() * variance.ln();
                 if likelihood > best {
                     let fade = (best - likelihood).exp();
                     sum *= fade;
@@ -86,8 +119,7 @@ impl Evidence {
         (sum > 0.0).then(|| waves.map(|value| value / sum))
     }
 
-    /// Logarithm of how likely the coefficients are with waves of some
-    /// variance, and of how likely such waves are.
+    /// Logarithm of how likely the coefficients are with waves of some variance.
     fn log_likelihood(&self, shares: &[f64; ORDERS], variance: f64) -> f64 {
         let (mut product, mut sum) = (1.0, 0.0);
         for (order, share) in shares.iter().enumerate() {
@@ -95,7 +127,7 @@ impl Evidence {
             sum += self.squares[order] / expected;
             product *= if self.counts[order] > 1.0 { expected * expected } else { expected };
         }
-        -0.5 * (product.max(f64::MIN_POSITIVE).ln() + sum) - SMALL_FIRST * variance.ln()
+        -0.5 * (product.max(f64::MIN_POSITIVE).ln() + sum)
     }
 }
 
@@ -158,16 +190,18 @@ fn likelihood_of_waves(square: f64) -> f64 {
     waves / (waves + BENT)
 }
 
-/// Variance of each coefficient for waves of variance 1, for each length: their
-/// autocorrelation is that of a Matérn process of order 3/2, which has a slope
-/// everywhere but is rougher than a Gaussian one.
-static SHARES: LazyLock<[[f64; ORDERS]; LENGTHS.len()]> = LazyLock::new(|| {
+/// Variance of each coefficient for waves of variance 1, for each length.
+type Shares = [[f64; ORDERS]; LENGTHS.len()];
+
+static SMOOTH: LazyLock<Shares> = LazyLock::new(|| shares_of(Waves::Smooth));
+static TORN: LazyLock<Shares> = LazyLock::new(|| shares_of(Waves::Torn));
+
+fn shares_of(kind: Waves) -> Shares {
     LENGTHS.map(|length| {
         let mut shares = [0.0; ORDERS];
         for i in 0..POINTS {
             for j in 0..POINTS {
-                let away = 3f64.sqrt() * (place(i) - place(j)).abs() / length;
-                let alike = (1.0 + away) * (-away).exp();
+                let alike = kind.correlation((place(i) - place(j)).abs() / length);
                 let (a, b) = (legendre(place(i)), legendre(place(j)));
                 for (order, share) in shares.iter_mut().enumerate() {
                     *share += alike * a[order] * b[order];
@@ -179,7 +213,7 @@ static SHARES: LazyLock<[[f64; ORDERS]; LENGTHS.len()]> = LazyLock::new(|| {
         }
         shares
     })
-});
+}
 
 /// Middle of a piece of the gauge, −1 to 1.
 fn place(piece: usize) -> f64 {
@@ -237,14 +271,14 @@ mod tests {
         let (mut found, mut wrong) = (0.0, 0);
         for _ in 0..400 {
             let (mut with, mut without) = (Evidence::default(), Evidence::default());
-            for (k, share) in SHARES[5].iter().enumerate() {
+            for (k, share) in SMOOTH[5].iter().enumerate() {
                 for _ in 0..2 {
                     with.add(k + 1, normal(0.25 * share + noise), noise);
                     without.add(k + 1, normal(noise), noise);
                 }
             }
-            wrong += usize::from(without.waves().is_some());
-            found += with.waves().unwrap()[0] / (0.25 * SHARES[5][0]) / 400.0;
+            wrong += usize::from(without.waves(Waves::Smooth).is_some());
+            found += with.waves(Waves::Smooth).unwrap()[0] / (0.25 * SMOOTH[5][0]) / 400.0;
         }
         assert!(wrong <= 4, "{wrong}");
         assert!((found - 1.0).abs() < 0.3, "{found}");

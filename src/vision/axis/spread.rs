@@ -6,7 +6,7 @@ use crate::vision::curve::Curve;
 use crate::vision::number::float;
 use crate::vision::scatter;
 use crate::vision::trace::Located;
-use crate::vision::waviness::{CURVED, Evidence, Midline, ORDERS, legendre, norm};
+use crate::vision::waviness::{CURVED, Evidence, Midline, ORDERS, Waves, legendre, norm};
 
 /// Share of the rows from which on nothing but the bead itself is seen.
 const ALL_BUT_FEW: f64 = 0.98;
@@ -203,7 +203,8 @@ impl Scene<'_> {
                 evidence.add(order, f64::midpoint(all(0), all(1)), noise);
             }
         }
-        evidence.waves()
+        let is_torn = self.sides.iter().any(|side| side.mean_variance.is_some());
+        evidence.waves(if is_torn { Waves::Torn } else { Waves::Smooth })
     }
 }
 

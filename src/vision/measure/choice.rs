@@ -1,9 +1,10 @@
 //! Whether edges that were measured as blurred steps are better told by rough ones:
 //! a groove that no step is, bays, or a flank that is wider than any blur.
 
-use super::judge::WIDEST_BLUR_PX;
+use super::judge::{WIDEST_BLUR_PX, WIDEST_MOTION_PX};
 use super::rough::WIDEST_ROUGH_PX;
 use super::{Way, Work};
+use crate::vision::reject::Reject;
 use crate::vision::rough::RoughFit;
 
 /// Share of an edge's rows that may be sorted out: more are bays, or grains.
@@ -20,6 +21,9 @@ const ELSEWHERE_PX: f64 = 3.0;
 /// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a
 /// wide flank.
 const PART_OF_FLANK: f64 = 0.5;
+/// The same of one edge alone, where both are wide: the rest of its flank was taken for
+/// shading.
+const REST_OF_FLANK: f64 = 0.88;
 /// Blur of a step from which on it may be a part of a flank \[px\].
 const WIDE_PX: f64 = 3.5;
 /// How much farther out than a blurred step a rough edge may lie \[px\].
@@ -57,7 +61,7 @@ impl Work {
     }
 
     /// Whether places of the edges were sorted out.
-    fn has_gaps(&self) -> bool {
+    pub(super) fn has_gaps(&self) -> bool {
         self.left.used_share().min(self.right.used_share()) < 1.0 - FEW_GAPS
     }
 
@@ -79,6 +83,17 @@ impl Work {
         let is_wide = self.is_refined() && fits.iter().any(|fit| fit.blur_px > WIDEST_ROUGH_PX)
             || fits.iter().all(|fit| fit.blur_px > WIDEST_BLUR_PX);
         is_wide || sides.all(|(fit, step)| step < PART_OF_FLANK * fit.contrast)
+    }
+
+    /// Refuses wide steps of which one is a part of its flank.
+    pub(super) fn check_flanks(&self, fits: &[RoughFit; 2]) -> Result<(), Reject> {
+        let mut sides = fits.iter().zip(self.contrasts);
+        let is_part = sides.any(|(fit, step)| step < REST_OF_FLANK * fit.contrast);
+        let (got_px, limit_px) = (fits[0].blur_px.max(fits[1].blur_px), WIDEST_MOTION_PX);
+        if self.is_wide() && is_part && got_px > limit_px {
+            return Err(Reject::Blurred { got_px, limit_px });
+        }
+        Ok(())
     }
 
     /// Whether one edge is much fainter than the other, as a rib's is.

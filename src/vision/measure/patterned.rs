@@ -10,6 +10,7 @@ use crate::vision::number::float;
 use crate::vision::pool;
 use crate::vision::reject::Reject;
 use crate::vision::strip::{Grey, Strip, View};
+use crate::vision::trace::Tracer;
 use crate::vision::width::WidthMeasurement;
 
 /// Strongest pattern of the ground, as a fraction of the contrast: one of a third is
@@ -77,21 +78,24 @@ impl Work {
         checked.err().filter(|_| !is_whole).map(Err)
     }
 
-    /// Whether the bead between two blurred steps has a texture beside both.
+    /// Whether the bead between two blurred steps has a texture, from that beside both.
     fn is_textured_between_steps<T: Grey>(&mut self, strip: &Strip<'_, T>) -> bool {
-        let noise = f64::from(self.noise);
         let sides = [(&self.left, 1.0), (&self.right, -1.0)];
         let room_px = self.right.middle() - self.left.middle();
-        sides.into_iter().zip(self.contrasts).all(|((tracer, inwards), contrast)| {
-            place(tracer, &self.lines, &mut self.places);
+        let mut shares = [0.0; 2];
+        for (((tracer, inwards), contrast), share) in
+            sides.into_iter().zip(self.contrasts).zip(&mut shares)
+        {
+            place_all(tracer, &self.lines, &mut self.places);
             let blur_px = tracer.blur_px;
             let side = Side { places: &self.places, outwards: inwards, blur_px, room_px };
-            let texture = self.ground.texture(strip, &side, noise);
-            texture.is_some_and(|texture| texture > NOTABLE_TEXTURE * contrast)
-        })
+            let texture = self.ground.texture(strip, &side, self.noise.into());
+            *share = texture.unwrap_or(0.0) / contrast;
+        }
+        (0.5 * (shares[0] * shares[0] + shares[1] * shares[1])).sqrt() > NOTABLE_TEXTURE
     }
 
-    /// The same between two lines.
+    /// Whether it has one beside both of two lines: one of them may lie on the ground.
     pub(super) fn is_textured_between_lines<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
@@ -168,6 +172,23 @@ impl Work {
 pub fn check_pattern(got: f64, is_textured: bool) -> Result<(), Reject> {
     let limit = if is_textured { STRONGEST_OF_SAME } else { STRONGEST_BESIDE_PLAIN };
     if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
+}
+
+/// Where an edge lies on all caliper lines: where it is not located, between those beside it.
+fn place_all(tracer: &Tracer, lines: &[(usize, usize)], places: &mut Vec<Place>) {
+    place(tracer, lines, places);
+    let located: Vec<(f64, f64)> =
+        places.iter().map(|place| (pool::middle(place.rows), place.at)).collect();
+    let (Some(first), Some(last)) = (located.first(), located.last()) else { return };
+    places.clear();
+    places.extend(lines.iter().map(|&rows| {
+        let row = pool::middle(rows);
+        let after = located.partition_point(|place| place.0 < row);
+        let (one, other) =
+            (located[..after].last().unwrap_or(first), located[after..].first().unwrap_or(last));
+        let share = if other.0 > one.0 { (row - one.0) / (other.0 - one.0) } else { 0.0 };
+        Place { rows, at: one.1 + share * (other.1 - one.1) }
+    }));
 }
 
 /// What is looked at for one edge of a pair.

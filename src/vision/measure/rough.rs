@@ -4,8 +4,11 @@ use super::choice::has_grains;
 use super::patterned::check_pattern;
 use super::{NEED_SHARE, Work, even};
 use crate::calib::SurfaceMap;
-use crate::vision::coarse::LinePair;
+use crate::vision::coarse::{LinePair, StepLine};
 use crate::vision::gauge::Polarity;
+use crate::vision::line::Line;
+use crate::vision::number::{float, narrow};
+use crate::vision::pool;
 use crate::vision::reject::Reject;
 use crate::vision::rough::{RoughFit, Scene};
 use crate::vision::strip::{Grey, Strip, View};
@@ -66,8 +69,37 @@ impl Work {
         strip: &Strip<'_, T>,
         range: (f32, f32),
     ) -> Result<[RoughFit; 2], Reject> {
-        let pair = self.find_lines(strip, range)?;
+        let pair = match self.find_lines(strip, range) {
+            // Holes within the bead that lie one behind the other look like ribs and texture.
+            Err(Reject::Ambiguous { .. } | Reject::Vague { .. })
+                if self.has_gaps() && self.pattern_share == 0.0 =>
+            {
+                self.pair_of_steps(strip)
+            }
+            pair => pair?,
+        };
         self.fit_rough(strip, &pair)
+    }
+
+    /// The lines along two blurred steps.
+    fn pair_of_steps<T: Grey>(&self, strip: &Strip<'_, T>) -> LinePair {
+        let middle = 0.5 * (float(strip.along) - 1.0);
+        let sides = [&self.left, &self.right].map(|tracer| {
+            let mut line = Line::default();
+            for (edge, &rows) in tracer.edges().iter().zip(&self.lines) {
+                if let Some(edge) = edge {
+                    line.add(pool::middle(rows) - middle, edge.at, edge.share);
+                }
+            }
+            let [at, next] = [0.0, 1.0].map(|row| line.at(row).0);
+            (narrow(at), narrow(next - at))
+        });
+        let steps = self.contrasts.map(narrow);
+        let [left, right] =
+            [0, 1].map(|k| StepLine { at: sides[k].0, slope: sides[k].1, step: steps[k] });
+        let bright = self.left.edges().iter().flatten().any(|edge| edge.height > 0.0);
+        let bare = (left.step * right.step).sqrt();
+        LinePair { sides: [left, right], bright, score: bare, bare, strengths: steps }
     }
 
     /// Looks for the bead's edges as lines.

@@ -7,6 +7,7 @@ use super::route::BLOCK;
 use super::whole;
 use super::window::Windows;
 use crate::vision::number::{float, single};
+use crate::vision::rank;
 use crate::vision::sheet::SPAN;
 
 /// Pixels outside that are searched for what the bead stands against: a groove's
@@ -19,6 +20,10 @@ const INSIDE: (f32, f32) = (6.0, 30.0);
 const INSIDE_FRACTION: (f32, f32) = (0.14, 0.42);
 /// Pixels of a course's profile.
 pub const LENGTH: usize = OUTSIDE + 30;
+/// How much darker than the bead a hole in it is at least: in median deviations of the
+/// bead's places, four standard deviations of a Gaussian, and as a fraction of the contrast.
+const HOLE_SPREADS: f32 = 6.0;
+const HOLE: f32 = 0.2;
 /// Rows over which the bead's level is averaged, as the standard deviation of a
 /// Gaussian: more than texture is long, less than the light changes within.
 const INSIDE_ROWS: f64 = 48.0;
@@ -187,8 +192,9 @@ impl Levels {
         let [inside, outside] = &self.kernels;
         self.beside.clear();
         smooth(&self.blocks, inside, &mut self.smooth);
-        self.beside.extend(self.smooth.iter().map(|profile| BlockLevels {
-            inside: mean_of(profile, mean.inside),
+        let bead = bead_levels(&self.blocks, &mean);
+        self.beside.extend((0..bead.len()).map(|block| BlockLevels {
+            inside: smooth_level(&bead, block, inside),
             ..BlockLevels::default()
         }));
         smooth(&self.blocks, outside, &mut self.smooth);
@@ -371,6 +377,49 @@ impl BlockLevels {
         self.outside =
             if mean.on_ground { mean_of(profile, mean.ground()) } else { profile[self.darkest] };
     }
+}
+
+/// Level of the bead in a block of rows, from so many of its places.
+#[derive(Debug, Clone, Copy)]
+struct BeadLevel {
+    grey: f32,
+    places: f32,
+}
+
+/// Levels of the bead without the holes in it, which count as bead.
+fn bead_levels(blocks: &[Profile], mean: &MeanProfile) -> Vec<BeadLevel> {
+    let (from, to) = mean.inside;
+    let mut values: Vec<f32> =
+        blocks.iter().flat_map(|profile| &profile[from..to]).copied().collect();
+    let median = rank::median(&mut values).unwrap_or(0.0);
+    for value in &mut values {
+        *value = (*value - median).abs();
+    }
+    let spread = rank::median(&mut values).unwrap_or(0.0);
+    let contrast = median - mean.grey[darkest_of(&mean.grey, 0)];
+    let limit = median - (HOLE_SPREADS * spread).max(HOLE * contrast);
+    let of_block = |profile: &Profile| {
+        let (mut sum, mut places) = (0.0, 0.0);
+        for value in profile[from..to].iter().filter(|value| **value > limit) {
+            sum += value;
+            places += 1.0;
+        }
+        BeadLevel { grey: if places > 0.0 { sum / places } else { median }, places }
+    };
+    blocks.iter().map(of_block).collect()
+}
+
+/// The bead's level about a block, by a kernel over the blocks on either side.
+fn smooth_level(levels: &[BeadLevel], block: usize, kernel: &[f32]) -> f32 {
+    let half = kernel.len() - 1;
+    let (mut sum, mut total) = (0.0, 0.0);
+    let near = block.saturating_sub(half)..(block + half + 1).min(levels.len());
+    for (other, level) in near.clone().zip(&levels[near]) {
+        let weight = kernel[other.abs_diff(block)] * level.places;
+        sum += weight * level.grey;
+        total += weight;
+    }
+    if total > 0.0 { sum / total } else { levels[block].grey }
 }
 
 /// Smooths the blocks' profiles along the bead.

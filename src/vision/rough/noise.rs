@@ -15,7 +15,7 @@ const MAX_LAG: usize = 6;
 const FINE_ROWS: usize = 5;
 /// Fraction of the irregular length of a flank by which an edge may lie elsewhere
 /// in it: half, were the flank an even ramp.
-const FLANK_FRACTION: f64 = 0.35;
+const FLANK_FRACTION: f64 = 0.25;
 /// How far the ground's pattern between its level and the edge may be off, in standard
 /// deviations of the level from place to place: an edge that is drawn outwards by bright
 /// places finds more of them.
