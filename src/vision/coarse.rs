@@ -4,9 +4,9 @@
 //! an edge does not.
 
 use super::number::single;
+use super::number::whole;
 use super::pair::{RIVAL_SHARE, SEAM_SHARE, is_narrower};
 use super::rank;
-use super::rough::whole;
 use super::strip::{Grey, Strip};
 
 /// Rows of a band at least, and bands at most.

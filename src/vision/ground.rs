@@ -1,22 +1,26 @@
 //! The pattern of what lies beside an edge, ground or bead: how strong it is, and how far
 //! it may move the mean of the edge.
 
+use super::number::whole;
 use super::number::{float, narrow};
 use super::rank;
-use super::rough::whole;
 use super::strip::{Grey, Strip};
 
 /// Distances from the edge at which the pattern is looked at \[px\]: the first one
 /// beyond the flank, in blurs and at least, and those after it.
 const FLANK_BLURS: f64 = 3.0;
 const FIRST_PX: f64 = 4.0;
-const STEP_PX: f64 = 2.0;
+const STEP_PX: usize = 2;
 const COLUMNS: usize = 10;
 /// Fewest lines that tell a pattern.
 const LEAST_LINES: usize = 8;
 /// Part of the noise's variance by which a pattern's must exceed it: less is not told
 /// from noise.
 const TOLD: f64 = 0.25;
+
+/// Variance of all pixels in that of the noise up to which they show nothing but noise:
+/// there is no need of medians.
+const SURELY_NOISE: f64 = 1.1;
 
 /// Places beside the edge within which a narrow groove lies \[px\].
 const GROOVE_PX: usize = 9;
@@ -48,25 +52,40 @@ pub struct Side<'a> {
 }
 
 impl Side<'_> {
-    /// Mean grey level at a distance from the edge, the gauge's border beyond it.
-    fn mean_at<T: Grey>(&self, strip: &Strip<'_, T>, off: f64) -> f64 {
-        let of_place = |place: &Place| -> f64 {
-            (place.rows.0..place.rows.1).map(|row| grey(strip, row, place.at + off)).sum()
-        };
-        self.places.iter().map(of_place).sum::<f64>() / float(self.rows().max(1))
+    /// Mean grey levels of the first pixels beside the edge, outwards, as far as they lie in
+    /// the gauge; near its border of those beside that.
+    fn profile<T: Grey>(&self, strip: &Strip<'_, T>) -> [f64; GROOVE_PX] {
+        let mut sums = [0; GROOVE_PX];
+        for place in self.places {
+            let nearest = whole(narrow(place.at));
+            let first =
+                if self.is_after() { nearest + 1 } else { nearest.saturating_sub(GROOVE_PX) };
+            let first = first.min(strip.across.saturating_sub(GROOVE_PX));
+            for row in place.rows.0..place.rows.1 {
+                let Some(pixels) = strip.row(row)[first..].first_chunk::<GROOVE_PX>() else {
+                    continue;
+                };
+                for (sum, pixel) in sums.iter_mut().zip(pixels) {
+                    *sum += pixel.level();
+                }
+            }
+        }
+        if !self.is_after() {
+            sums.reverse();
+        }
+        let scale = f64::from(strip.scale) / float(self.rows().max(1));
+        sums.map(|sum: u32| scale * f64::from(sum))
+    }
+
+    /// Whether it lies at higher positions than the edge.
+    fn is_after(&self) -> bool {
+        self.outwards > 0.0
     }
 
     /// Number of rows.
     fn rows(&self) -> usize {
         self.places.iter().map(|place| place.rows.1 - place.rows.0).sum()
     }
-}
-
-/// Grey level of a pixel, or of the nearest one in the gauge.
-fn grey<T: Grey>(strip: &Strip<'_, T>, row: usize, at: f64) -> f64 {
-    let row = strip.row(row);
-    let pixel = row[whole(narrow(at)).min(row.len() - 1)];
-    f64::from(strip.scale * T::float(pixel.add_to(T::Sum::default())))
 }
 
 /// A pattern beside an edge.
@@ -83,101 +102,111 @@ pub struct Pattern {
 /// Looks for patterns; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct Ground {
-    /// Columns of pixels along the edge, less their slope along the bead.
-    columns: Vec<f64>,
+    /// Grey levels beside the edge, line by line, each column less its straight line.
+    lines: Vec<Line>,
+    /// Columns that lie within the gauge.
+    columns: usize,
+    column: Vec<f32>,
 }
+
+/// Pixels of one line, outwards.
+type Line = [f32; COLUMNS];
 
 impl Ground {
     /// The pattern along an edge. `noise` is the standard deviation of a pixel's
     /// \[grey levels\]. `None` where none is told from noise, or too little is in the
     /// gauge.
+    #[inline(always)]
     pub fn pattern<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
         side: &Side<'_>,
         noise: f64,
     ) -> Option<Pattern> {
-        let count = side.places.len();
-        let mean_square = |column: &mut [f64]| {
-            let squares: f64 = column.iter().map(|value| value * value).sum();
-            Some(squares / float(count - 2))
-        };
-        let size_grey = self.spread(strip, side, noise, mean_square)?;
-        Some(Pattern { size_grey, mean_variance: self.variance_of_mean(count, noise) })
+        let mut variances = self.look(strip, side, noise)?;
+        let size_grey = self.without_noise(&mut variances, noise)?;
+        Some(Pattern { size_grey, mean_variance: self.variance_of_mean(noise) })
     }
 
     /// Standard deviation of the texture along a side, without the pixels' noise
     /// \[grey levels\], from the median of how far pixels are off: a few sparks or holes
     /// are none. `None` as for a pattern.
+    #[inline(always)]
     pub fn texture<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
         side: &Side<'_>,
         noise: f64,
     ) -> Option<f64> {
-        self.spread(strip, side, noise, |column| {
-            for value in column.iter_mut() {
-                *value = value.abs();
-            }
-            rank::median(column).map(|median| (rank::SIGMA_PER_MEDIAN * median).powi(2))
-        })
+        let mut variances = self.look(strip, side, noise)?;
+        for (column, variance) in variances.iter_mut().enumerate() {
+            self.column.clear();
+            self.column.extend(self.lines.iter().map(|line| line[column].abs()));
+            let median = f64::from(rank::median(&mut self.column)?);
+            *variance = narrow((rank::SIGMA_PER_MEDIAN * median).powi(2));
+        }
+        self.without_noise(&mut variances, noise)
     }
 
-    /// Standard deviation along a side without the pixels' noise \[grey levels\], from the
-    /// median of the columns' variances.
-    fn spread<T: Grey>(
+    /// Reads what lies beside an edge: the variance of each column; `None` where all
+    /// together are surely noise.
+    #[inline(always)]
+    fn look<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
         side: &Side<'_>,
         noise: f64,
-        variance_of: impl Fn(&mut [f64]) -> Option<f64>,
-    ) -> Option<f64> {
+    ) -> Option<[f32; COLUMNS]> {
         let count = side.places.len();
         if count < LEAST_LINES {
             return None;
         }
         self.read(strip, side);
-        let mut variances = [0.0_f32; COLUMNS];
-        let mut columns = 0;
-        for (column, variance) in self.columns.chunks_exact_mut(count).zip(&mut variances) {
-            *variance = narrow(variance_of(column)?);
-            columns += 1;
-        }
-        let variance = f64::from(rank::median(&mut variances[..columns])?) - noise * noise;
+        level(&mut self.lines);
+        let freedom = 1.0 / narrow(float(count - 2));
+        let variances = sum(self.lines.iter().map(|line| line.map(|grey| freedom * grey * grey)));
+        let mean = variances[..self.columns].iter().sum::<f32>() / narrow(float(self.columns));
+        (f64::from(mean) > SURELY_NOISE * noise * noise).then_some(variances)
+    }
+
+    /// Standard deviation without the pixels' noise, from the median of the columns'
+    /// variances \[grey levels\]; `None` where it is not told from noise.
+    fn without_noise(&self, variances: &mut [f32; COLUMNS], noise: f64) -> Option<f64> {
+        let variance = f64::from(rank::median(&mut variances[..self.columns])?) - noise * noise;
         (variance > TOLD * noise * noise).then(|| variance.sqrt())
     }
 
     /// Reads columns of pixels beside an edge, as far as they lie within the gauge.
+    #[inline(always)]
     fn read<T: Grey>(&mut self, strip: &Strip<'_, T>, side: &Side<'_>) {
         let first = FIRST_PX.max(FLANK_BLURS * side.blur_px);
         let last = float(strip.across - 1);
-        self.columns.clear();
-        for column in 0..COLUMNS {
-            let distance = first + STEP_PX * float(column);
-            if distance > side.room_px - first {
-                return;
-            }
-            let off = side.outwards * distance;
-            if side.places.iter().any(|place| place.at + off < 0.0 || place.at + off > last) {
-                return;
-            }
-            let start = self.columns.len();
-            self.columns.extend(side.places.iter().map(|place| {
-                let row = usize::midpoint(place.rows.0, place.rows.1 - 1);
-                grey(strip, row, place.at + off)
-            }));
-            level(&mut self.columns[start..]);
-        }
+        let border = |place: &Place| if side.is_after() { last - place.at } else { place.at };
+        let room = side.places.iter().map(border).fold(side.room_px - first, f64::min);
+        let fits = |column: &usize| first + float(STEP_PX * column) <= room;
+        self.columns = (0..COLUMNS).take_while(fits).count();
+        self.lines.clear();
+        self.lines.extend(side.places.iter().map(|place| {
+            let pixels = strip.row(usize::midpoint(place.rows.0, place.rows.1 - 1));
+            let nearest = whole(narrow(place.at + side.outwards * first));
+            std::array::from_fn(|column| {
+                let off = STEP_PX * column;
+                let at = if side.is_after() { nearest + off } else { nearest.saturating_sub(off) };
+                let pixel = pixels[at.min(pixels.len() - 1)];
+                strip.scale * T::float(pixel.add_to(T::Sum::default()))
+            })
+        }));
     }
 
-    /// Variance of the mean of so many lines, from their covariances up to the first
-    /// that is not positive.
-    fn variance_of_mean(&self, count: usize, noise: f64) -> f64 {
+    /// Variance of the mean of all lines, from their covariances up to the first that is
+    /// not positive.
+    fn variance_of_mean(&self, noise: f64) -> f64 {
+        let count = self.lines.len();
         let covariance = |lag: usize| {
-            let products = self.columns.chunks_exact(count).map(|column| {
-                column[lag..].iter().zip(column).map(|(one, other)| one * other).sum::<f64>()
-            });
-            products.sum::<f64>() / float(self.columns.len())
+            let pairs = self.lines[lag..].iter().zip(&self.lines);
+            let products = sum(pairs.map(|(a, b)| std::array::from_fn(|k| a[k] * b[k])));
+            let all = products[..self.columns].iter().sum::<f32>();
+            f64::from(all) / float(self.columns * count)
         };
         let later = (1..count / 4).map(covariance).take_while(|covariance| *covariance > 0.0);
         let sum = covariance(0) - noise * noise + 2.0 * later.sum::<f64>();
@@ -191,26 +220,38 @@ impl Ground {
 pub fn rises<T: Grey>(strip: &Strip<'_, T>, side: &Side<'_>, noise: f64, contrast: f64) -> bool {
     let mut darkest = f64::INFINITY;
     let mut rise: f64 = 0.0;
-    for off in 1..=GROOVE_PX {
-        let grey = side.mean_at(strip, side.outwards * float(off));
+    for grey in side.profile(strip) {
         darkest = darkest.min(grey);
         rise = rise.max(grey - darkest);
     }
     rise > (RISE * contrast).max(RISE_SIGMAS * noise / float(side.rows().max(1)).sqrt())
 }
 
-/// Takes the straight line through values out of them.
-fn level(values: &mut [f64]) {
-    let count = float(values.len());
+/// Takes the straight line through each column out of it.
+#[inline(always)]
+fn level(lines: &mut [Line]) {
+    let count = narrow(float(lines.len()));
     let middle = (count - 1.0) / 2.0;
-    let mean = values.iter().sum::<f64>() / count;
-    let (mut across, mut along) = (0.0, 0.0);
-    for (k, value) in values.iter().enumerate() {
-        let place = float(k) - middle;
-        across += place * (value - mean);
-        along += place * place;
+    let means = sum(lines.iter().copied()).map(|sum| sum / count);
+    let places = || (0..).map(move |k| narrow(float(k)) - middle);
+    let across = sum(lines.iter().zip(places()).map(|(line, place)| line.map(|v| place * v)));
+    let along = count * (count * count - 1.0) / 12.0;
+    let slopes = across.map(|across| across / along);
+    for (line, place) in lines.iter_mut().zip(places()) {
+        for (value, (mean, slope)) in line.iter_mut().zip(means.iter().zip(&slopes)) {
+            *value -= mean + slope * place;
+        }
     }
-    for (k, value) in values.iter_mut().enumerate() {
-        *value -= mean + across / along * (float(k) - middle);
+}
+
+/// Sum of lines, column by column.
+#[inline(always)]
+fn sum(lines: impl Iterator<Item = Line>) -> Line {
+    let mut sums = [0.0; COLUMNS];
+    for line in lines {
+        for (sum, value) in sums.iter_mut().zip(line) {
+            *sum += value;
+        }
     }
+    sums
 }

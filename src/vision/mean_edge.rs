@@ -12,9 +12,10 @@
 mod weights;
 
 use super::coarse::StepLine;
+use super::number::whole;
 use super::number::{float, narrow};
 use super::rank;
-use super::rough::{RoughFit, whole};
+use super::rough::RoughFit;
 use super::step::StepTable;
 use super::strip::{Grey, Strip};
 use super::trace::Located;
@@ -88,6 +89,41 @@ impl<T: Grey> Scene<'_, T> {
         let grey = one + (at - float(before)).clamp(0.0, 1.0) * (other - one);
         let sign = if self.bright { 1.0 } else { -1.0 };
         sign * f64::from(self.strip.scale) * grey
+    }
+
+    /// Grey levels of a row at a position and at each pixel inwards of it, between two
+    /// pixels each; dark beads negated.
+    #[inline(always)]
+    fn read(&self, row: usize, from: f64, out: &mut [f32]) {
+        let pixels = self.strip.row(row);
+        let sign = if self.bright { 1.0 } else { -1.0 };
+        let scale = sign * self.strip.scale;
+        let of = |pixel: &T| scale * T::float(pixel.add_to(T::Sum::default()));
+        let before = from.floor();
+        let share = narrow(from - before);
+        let reach = float(out.len());
+        let (lowest, highest) = if self.bead_after {
+            (before, before + reach)
+        } else {
+            (before + 1.0 - reach, before + 1.0)
+        };
+        if lowest < 0.0 || highest > self.last() {
+            // Beyond the gauge its last pixel goes on.
+            for (k, out) in out.iter_mut().enumerate() {
+                *out = narrow(self.grey(row, from + self.inwards() * float(k)));
+            }
+            return;
+        }
+        let pixels = &pixels[whole(narrow(lowest))..=whole(narrow(highest))];
+        let between = pixels.windows(2).map(|two| {
+            let (one, other) = (of(&two[0]), of(&two[1]));
+            one + share * (other - one)
+        });
+        if self.bead_after {
+            out.iter_mut().zip(between).for_each(|(out, grey)| *out = grey);
+        } else {
+            out.iter_mut().rev().zip(between).for_each(|(out, grey)| *out = grey);
+        }
     }
 
     /// Direction from the edge into the bead.
@@ -204,8 +240,10 @@ impl MeanEdge {
         line: &StepLine,
         table: &StepTable,
     ) -> [f64; BLURS_PX.len()] {
+        self.take(scene, line);
+        let start = self.course;
         BLURS_PX.map(|blur_px| {
-            self.take(scene, line);
+            self.course = start;
             let weights = Weights::new(table, blur_px, self.half);
             let found = weights.and_then(|weights| self.descend(scene, &weights, false));
             found.map_or(f64::INFINITY, |found| found.left_over)
@@ -254,12 +292,7 @@ impl MeanEdge {
     ) -> Option<Descent> {
         let start = self.course.at;
         for _ in 0..MAX_STEPS {
-            let off = -float(self.half);
-            let means: [[f64; WINDOW]; 3] = std::array::from_fn(|term| {
-                let mut mean = [0.0; WINDOW];
-                self.means(scene, term, off, &mut mean[..=2 * self.half]);
-                mean
-            });
+            let means = self.means_about(scene);
             let step = weights.step(&means[0]);
             if step <= 0.0 || (self.course.at - start).abs() > FARTHEST_PX {
                 return None;
@@ -279,18 +312,47 @@ impl MeanEdge {
         None
     }
 
+    /// Mean over the rows of the window about the course, and how it changes with the
+    /// course's tilt and bend.
+    #[inline(always)]
+    fn means_about<T: Grey>(&self, scene: &Scene<'_, T>) -> [[f64; WINDOW]; 3] {
+        let mut means = [[0.0; WINDOW]; 3];
+        let mut squares = [0.0; 3];
+        let pixels = 2 * self.half + 1;
+        let mut greys = [0.0_f32; WINDOW];
+        for row in 0..scene.strip.along {
+            let place = scene.place(row);
+            let from = self.course.at(place) - scene.inwards() * float(self.half);
+            scene.read(row, from, &mut greys[..pixels]);
+            let shares = [1.0, place, bend_at(place)];
+            for ((mean, square), share) in means.iter_mut().zip(&mut squares).zip(shares) {
+                *square += share * share;
+                for (mean, grey) in mean.iter_mut().zip(&greys) {
+                    *mean += share * f64::from(*grey);
+                }
+            }
+        }
+        for (mean, square) in means.iter_mut().zip(squares) {
+            for mean in mean {
+                *mean /= square.max(f64::MIN_POSITIVE);
+            }
+        }
+        means
+    }
+
     /// Mean over the rows at distances from the course, from one inwards on; of term 1
     /// and 2 how it changes with the course's tilt and bend.
     fn means<T: Grey>(&self, scene: &Scene<'_, T>, term: usize, first: f64, out: &mut [f64]) {
         out.fill(0.0);
         let mut squares = 0.0;
+        let mut greys = vec![0.0_f32; out.len()];
         for row in 0..scene.strip.along {
             let place = scene.place(row);
             let share = [1.0, place, bend_at(place)][term];
             squares += share * share;
-            let from = self.course.at(place) + scene.inwards() * first;
-            for (k, out) in out.iter_mut().enumerate() {
-                *out += share * scene.grey(row, from + scene.inwards() * float(k));
+            scene.read(row, self.course.at(place) + scene.inwards() * first, &mut greys);
+            for (out, grey) in out.iter_mut().zip(&greys) {
+                *out += share * f64::from(*grey);
             }
         }
         for out in out {
@@ -323,14 +385,16 @@ impl MeanEdge {
     ) {
         self.lines.clear();
         let mut positions = Vec::with_capacity(scene.lines.len());
+        let mut greys = [0.0_f32; WINDOW];
         for &(from, to) in scene.lines {
             let (mut aside, mut middle) = (0.0, 0.0);
             for row in from..to {
                 let at = self.course.at(scene.place(row));
                 middle += at / float(to - from);
-                for (k, weight) in weights.place[..=2 * self.half].iter().enumerate() {
-                    let off = scene.inwards() * (float(k) - float(self.half));
-                    aside += weight * scene.grey(row, at + off);
+                let greys = &mut greys[..=2 * self.half];
+                scene.read(row, at - scene.inwards() * float(self.half), greys);
+                for (weight, grey) in weights.place.iter().zip(greys) {
+                    aside += weight * f64::from(*grey);
                 }
             }
             let aside = aside / found.step / float(to - from) - shift;

@@ -18,3 +18,15 @@ pub fn single(number: usize) -> f32 {
 pub fn narrow(value: f64) -> f32 {
     value as f32
 }
+
+/// The nearest number of rows or pixels; 0 of less than none.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "lengths are a few pixels and not negative"
+)]
+#[inline(always)]
+pub fn whole(length: f32) -> usize {
+    // Faster than to round: what is cut off is the fraction.
+    (length + 0.5).max(0.0) as usize
+}

@@ -21,7 +21,7 @@ mod route;
 mod window;
 
 use super::coarse::StepLine;
-use super::number::{float, narrow};
+use super::number::{float, narrow, whole};
 use super::strip::{Grey, Strip};
 use super::trace::{self, Located};
 pub use groove::Blur;
@@ -239,16 +239,6 @@ impl RoughEdge {
             self.lines.push(located);
         }
     }
-}
-
-/// A number of rows or pixels from a length.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "lengths are a few pixels and not negative"
-)]
-pub fn whole(length: f32) -> usize {
-    length.max(0.0).round() as usize
 }
 
 /// The Gaussian kernel of a standard deviation \[samples\], normalised, from its

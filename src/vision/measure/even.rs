@@ -3,8 +3,9 @@
 
 use crate::vision::coarse::LinePair;
 use crate::vision::number::single;
+use crate::vision::number::whole;
 use crate::vision::reject::Reject;
-use crate::vision::rough::{RoughFit, whole};
+use crate::vision::rough::RoughFit;
 use crate::vision::strip::{Grey, Strip};
 
 /// Largest difference of brightness, as a share of the fainter edge's contrast: beads of

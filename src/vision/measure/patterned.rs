@@ -177,6 +177,9 @@ pub fn check_pattern(got: f64, is_textured: bool) -> Result<(), Reject> {
 /// Where an edge lies on all caliper lines: where it is not located, between those beside it.
 fn place_all(tracer: &Tracer, lines: &[(usize, usize)], places: &mut Vec<Place>) {
     place(tracer, lines, places);
+    if places.len() == lines.len() {
+        return;
+    }
     let located: Vec<(f64, f64)> =
         places.iter().map(|place| (pool::middle(place.rows), place.at)).collect();
     let (Some(first), Some(last)) = (located.first(), located.last()) else { return };
