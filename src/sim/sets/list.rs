@@ -153,11 +153,7 @@ fn odd() -> Vec<Set> {
             picture.motion = Motion { length_px: 6.0, direction_deg: 15.0 };
         }),
         // Weights that know the texture's autocorrelation leave 0.0985 px.
-        Set {
-            rows: 400,
-            limits: Limits { rmse_px: Some(0.103), ..layer.limits },
-            ..layer
-        },
+        Set { rows: 400, limits: Limits { rmse_px: Some(0.103), ..layer.limits }, ..layer },
     ]
 }
 
