@@ -43,7 +43,7 @@ pub struct Place {
 pub struct Side<'a> {
     /// The edge, row by row.
     pub places: &'a [Place],
-    /// Direction away from the bead: 1 or -1.
+    /// Direction in which to look, away from the edge: 1 or -1.
     pub outwards: f64,
     /// Blur of the edge \[px\].
     pub blur_px: f64,

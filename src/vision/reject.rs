@@ -260,7 +260,7 @@ impl fmt::Display for Reject {
             ),
             Self::Vague { got, need } => write!(
                 f,
-                "the fainter edge stands out {got:.1} times from the bead's texture, {need:.1} are needed; light that makes both edges clear, or a longer gauge along the bead, helps"
+                "no bead that stands out from the texture of the picture: the likeliest edge is {got:.1} times as strong as lines of texture, {need:.1} are needed; check that a bead lies in roi_px along bead_axis, with this polarity and width_range_mm; if it does, light that makes both edges clear or a longer gauge helps"
             ),
             Self::Ambiguous { first_mm, second_mm } => write!(
                 f,

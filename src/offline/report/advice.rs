@@ -32,10 +32,11 @@ pub fn on(status: &str) -> (&'static str, &'static str) {
             "Make roi_px larger across the bead, or bring the bead back to its middle.",
         ),
         "unsure" => (
-            "The standard deviation of the width is more than max_sigma of it, or too little of an \
-             edge is seen.",
-            "Make the gauge longer along the bead and raise the contrast of the edges; remove what \
-             occludes them. The first message of this status says whether the calibration's \
+            "The standard deviation of the width is more than max_sigma of it, too little of an \
+             edge is seen, or no edge stands out from texture, from a pattern of the ground or \
+             from blur.",
+            "Check that a bead lies in the gauge. Make the gauge longer along the bead and raise the \
+             contrast of the edges; remove what occludes them. The first message of this status says whether the calibration's \
              uncertainty is the larger part. Raise max_sigma only if such widths are good enough.",
         ),
         "ambiguous" => (

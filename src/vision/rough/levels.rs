@@ -191,7 +191,6 @@ impl Levels {
         let mean = mean_profile(&self.blocks, width_px)?;
         let [inside, outside] = &self.kernels;
         self.beside.clear();
-        smooth(&self.blocks, inside, &mut self.smooth);
         let bead = bead_levels(&self.blocks, &mean);
         self.beside.extend((0..bead.len()).map(|block| BlockLevels {
             inside: smooth_level(&bead, block, inside),
@@ -386,7 +385,7 @@ struct BeadLevel {
     places: f32,
 }
 
-/// Levels of the bead without the holes in it, which count as bead.
+/// Levels of the bead itself: places that show a hole in it are passed over.
 fn bead_levels(blocks: &[Profile], mean: &MeanProfile) -> Vec<BeadLevel> {
     let (from, to) = mean.inside;
     let mut values: Vec<f32> =
