@@ -132,8 +132,8 @@ impl<T: Grey> Scene<'_, T> {
     }
 }
 
-/// A course along the gauge: position in its middle, and half of what it moves by from
-/// end to end \[px\]; the bend is a parabola's with a mean of zero.
+/// A course along the gauge: its mean position, and half of what it moves by from end to
+/// end \[px\]; the bend is a parabola's with a mean of zero.
 #[derive(Debug, Clone, Copy, Default)]
 struct Bent {
     at: f64,
@@ -167,7 +167,8 @@ pub struct MeanEdge {
 pub struct MeanFit {
     /// What the ground makes of the edge's position, and the bead.
     pub samples: [Samples; 2],
-    /// Step from the ground to the bead, as far as either is looked at \[grey levels\].
+    /// Step from the ground to the bead \[grey levels\]: the smaller of that in the window
+    /// and that of all places that are looked at.
     pub contrast: f64,
     /// Level of the bead beside the edge \[grey levels\], dark beads inverted.
     pub bead_grey: f64,

@@ -21,7 +21,7 @@ const ELSEWHERE_PX: f64 = 3.0;
 /// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a
 /// wide flank.
 const PART_OF_FLANK: f64 = 0.5;
-/// The same of one edge alone, where both are wide: the rest of its flank was taken for
+/// The same of one edge alone, where either is wide: the rest of its flank was taken for
 /// shading.
 const REST_OF_FLANK: f64 = 0.88;
 /// Blur of a step from which on it may be a part of a flank \[px\].
@@ -60,7 +60,7 @@ impl Work {
         self.left.blur_px.max(self.right.blur_px) > WIDE_PX
     }
 
-    /// Whether places of the edges were sorted out.
+    /// Whether more than a few places of an edge were sorted out.
     pub(super) fn has_gaps(&self) -> bool {
         self.left.used_share().min(self.right.used_share()) < 1.0 - FEW_GAPS
     }

@@ -50,7 +50,8 @@ impl Work {
 
     /// Measures a bead that was measured already, where it or the ground has a pattern.
     /// `None` where neither has, or a weak one, or no lines are found, and where the mean
-    /// profile tells no edges while the blurred steps show all along the bead.
+    /// profile tells no edges and either the pattern is bearable or the blurred steps show
+    /// all along the bead.
     #[inline(never)]
     pub(super) fn measure_textured<T: Grey>(
         &mut self,
