@@ -3,8 +3,7 @@
 //! whole gauge (a Radon transform of the step response). Texture averages out;
 //! an edge does not.
 
-use super::number::single;
-use super::number::whole;
+use super::number::{single, whole};
 use super::pair::{RIVAL_SHARE, SEAM_SHARE, is_narrower};
 use super::rank;
 use super::strip::{Grey, Strip};

@@ -1,8 +1,7 @@
 //! The pattern of what lies beside an edge, ground or bead: how strong it is, and how far
 //! it may move the mean of the edge.
 
-use super::number::whole;
-use super::number::{float, narrow};
+use super::number::{float, narrow, whole};
 use super::rank;
 use super::strip::{Grey, Strip};
 
@@ -139,7 +138,7 @@ impl Ground {
         noise: f64,
     ) -> Option<f64> {
         let mut variances = self.look(strip, side, noise)?;
-        for (column, variance) in variances.iter_mut().enumerate() {
+        for (column, variance) in variances.iter_mut().enumerate().take(self.columns) {
             self.column.clear();
             self.column.extend(self.lines.iter().map(|line| line[column].abs()));
             let median = f64::from(rank::median(&mut self.column)?);

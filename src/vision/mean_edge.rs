@@ -12,8 +12,7 @@
 mod weights;
 
 use super::coarse::StepLine;
-use super::number::whole;
-use super::number::{float, narrow};
+use super::number::{float, narrow, whole};
 use super::rank;
 use super::rough::RoughFit;
 use super::step::StepTable;
@@ -293,12 +292,13 @@ impl MeanEdge {
     ) -> Option<Descent> {
         let start = self.course.at;
         for _ in 0..MAX_STEPS {
-            let means = self.means_about(scene);
+            let means = self.means(scene, -float(self.half), 2 * self.half + 1);
             let step = weights.step(&means[0]);
             if step <= 0.0 || (self.course.at - start).abs() > FARTHEST_PX {
                 return None;
             }
-            let moves = means.map(|mean| scene.inwards() * product(&weights.place, &mean) / step);
+            let moves =
+                means.each_ref().map(|mean| scene.inwards() * product(&weights.place, mean) / step);
             let is_near = moves[0].abs() < LAST_PX && moves[1].abs() < LAST_PX;
             if is_near && (!bends || moves[2].abs() < LAST_PX) {
                 let left_over = weights.left_over(&means[0]);
@@ -313,18 +313,15 @@ impl MeanEdge {
         None
     }
 
-    /// Mean over the rows of the window about the course, and how it changes with the
-    /// course's tilt and bend.
-    #[inline(always)]
-    fn means_about<T: Grey>(&self, scene: &Scene<'_, T>) -> [[f64; WINDOW]; 3] {
-        let mut means = [[0.0; WINDOW]; 3];
+    /// Mean over the rows of so many pixels at distances from the course, from one inwards
+    /// on, and how it changes with the course's tilt and bend.
+    fn means<T: Grey>(&self, scene: &Scene<'_, T>, first: f64, pixels: usize) -> [Vec<f64>; 3] {
+        let mut means: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; pixels]);
         let mut squares = [0.0; 3];
-        let pixels = 2 * self.half + 1;
-        let mut greys = [0.0_f32; WINDOW];
+        let mut greys = vec![0.0_f32; pixels];
         for row in 0..scene.strip.along {
             let place = scene.place(row);
-            let from = self.course.at(place) - scene.inwards() * float(self.half);
-            scene.read(row, from, &mut greys[..pixels]);
+            scene.read(row, self.course.at(place) + scene.inwards() * first, &mut greys);
             let shares = [1.0, place, bend_at(place)];
             for ((mean, square), share) in means.iter_mut().zip(&mut squares).zip(shares) {
                 *square += share * share;
@@ -341,26 +338,6 @@ impl MeanEdge {
         means
     }
 
-    /// Mean over the rows at distances from the course, from one inwards on; of term 1
-    /// and 2 how it changes with the course's tilt and bend.
-    fn means<T: Grey>(&self, scene: &Scene<'_, T>, term: usize, first: f64, out: &mut [f64]) {
-        out.fill(0.0);
-        let mut squares = 0.0;
-        let mut greys = vec![0.0_f32; out.len()];
-        for row in 0..scene.strip.along {
-            let place = scene.place(row);
-            let share = [1.0, place, bend_at(place)][term];
-            squares += share * share;
-            scene.read(row, self.course.at(place) + scene.inwards() * first, &mut greys);
-            for (out, grey) in out.iter_mut().zip(&greys) {
-                *out += share * f64::from(*grey);
-            }
-        }
-        for out in out {
-            *out /= squares.max(f64::MIN_POSITIVE);
-        }
-    }
-
     /// The same of ground and bead, free of the flank, as far as they lie in the gauge.
     fn beside<T: Grey>(&self, scene: &Scene<'_, T>, free: usize, term: usize) -> [Vec<f64>; 2] {
         let ends = [-1.0, 0.0, 1.0].map(|place| self.course.at(place));
@@ -369,10 +346,8 @@ impl MeanEdge {
         let room = if scene.bead_after { nearest } else { scene.last() - farthest };
         let ground_px = GROUND_PX.min(whole(narrow(room.floor()))).saturating_sub(free);
         let bead_px = BEAD_PX.min(whole(0.5 * scene.width_px)).saturating_sub(free);
-        let mut sides = [vec![0.0; ground_px], vec![0.0; bead_px]];
-        self.means(scene, term, -float(ground_px + free), &mut sides[0]);
-        self.means(scene, term, float(free), &mut sides[1]);
-        sides
+        let sides = [(-float(ground_px + free), ground_px), (float(free), bead_px)];
+        sides.map(|(first, pixels)| std::mem::take(&mut self.means(scene, first, pixels)[term]))
     }
 
     /// Positions of the caliper lines, less what all are shifted inwards by.

@@ -175,8 +175,8 @@ impl RoughEdge {
         for at in &mut self.crossings.at {
             *at += narrow(shift);
         }
-        let waves = noise::roughness(&self.crossings).sqrt();
         let of_waves = if hides_depth {
+            let waves = noise::roughness(&self.crossings).sqrt();
             (GROOVE_WAVES * waves).min(MOST_GROOVE_WAVES_PX).powi(2)
         } else {
             0.0

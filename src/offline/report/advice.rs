@@ -36,8 +36,8 @@ pub fn on(status: &str) -> (&'static str, &'static str) {
              edge is seen, or no edge stands out from texture, from a pattern of the ground or \
              from blur.",
             "Check that a bead lies in the gauge. Make the gauge longer along the bead and raise the \
-             contrast of the edges; remove what occludes them. The first message of this status says whether the calibration's \
-             uncertainty is the larger part. Raise max_sigma only if such widths are good enough.",
+             contrast of the edges; remove what occludes them. The first message of this status \
+             says whether the calibration's uncertainty is the larger part. Raise max_sigma only if such widths are good enough.",
         ),
         "ambiguous" => (
             "Two pairs of edges fit the bead equally well.",
