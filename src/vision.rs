@@ -78,6 +78,7 @@ mod strip;
 mod template;
 mod texture;
 mod trace;
+mod vectors;
 mod waviness;
 mod whiten;
 pub mod width;

@@ -105,8 +105,15 @@ impl Coarse {
     }
 
     /// Pairs of lines at a distance within a range, the strongest first.
-    /// `polarities` are whether bright and dark beads are looked for.
-    pub fn pairs(&self, width_px: (f32, f32), polarities: [bool; 2], out: &mut Vec<LinePair>) {
+    /// `polarities` are whether bright and dark beads are looked for; where a groove may lie
+    /// beside a bright one, its far side adds to the edge.
+    pub fn pairs(
+        &self,
+        width_px: (f32, f32),
+        polarities: [bool; 2],
+        may_be_groove: bool,
+        out: &mut Vec<LinePair>,
+    ) {
         out.clear();
         for (bright, wanted) in [(true, polarities[0]), (false, polarities[1])] {
             if !wanted {
@@ -114,7 +121,8 @@ impl Coarse {
             }
             let (lefts, rights) =
                 if bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
-            let far_sides = (bright.then_some(rights), bright.then_some(lefts));
+            let has_far_sides = bright && may_be_groove;
+            let far_sides = (has_far_sides.then_some(rights), has_far_sides.then_some(lefts));
             for &left in lefts {
                 for &right in rights {
                     let width = right.at - left.at;

@@ -35,9 +35,10 @@ pub enum Method {
 }
 
 /// What the bead's edges look like.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum EdgeKind {
     /// Found from the frame.
+    #[default]
     Auto,
     /// A step of brightness: the bead lies on ground that is brighter or darker.
     Step,

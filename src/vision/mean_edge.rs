@@ -12,12 +12,13 @@
 mod weights;
 
 use super::coarse::StepLine;
-use super::number::{float, narrow, whole};
+use super::number::{float, floor, narrow, whole};
 use super::rank;
 use super::rough::RoughFit;
 use super::step::StepTable;
 use super::strip::{Grey, Strip};
 use super::trace::Located;
+use super::vectors;
 use weights::{Samples, Weights, product};
 
 /// Half of the window about an edge \[px\]: longer than a pattern of usual size, so that
@@ -31,6 +32,10 @@ const WINDOW: usize = 2 * HALF_PX + 1;
 /// Blurs that are tried \[px\]: a lens's, up to the roughness of a torn edge. A wrong one
 /// does not move an edge in the middle of its window; it only lets in more noise.
 pub const BLURS_PX: [f64; 7] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0];
+/// The one of them with which an edge is approached.
+const USUAL_BLUR: usize = 3;
+/// How far from each other edges of different blurs rest in a profile \[px\].
+const NEAR_PX: usize = 4;
 /// Steps of the descent, the longest of them and the last \[px\].
 const MAX_STEPS: usize = 12;
 const LONGEST_PX: f64 = 1.5;
@@ -78,51 +83,28 @@ impl<T: Grey> Scene<'_, T> {
         (float(row) + 0.5 - half) / half
     }
 
-    /// Grey level at a position of a row, between its two pixels; dark beads negated.
-    fn grey(&self, row: usize, at: f64) -> f64 {
-        let row = self.strip.row(row);
-        let before = whole(narrow(at.floor())).min(row.len() - 1);
-        let after = (before + 1).min(row.len() - 1);
-        let of = |pixel: T| f64::from(T::float(pixel.add_to(T::Sum::default())));
-        let (one, other) = (of(row[before]), of(row[after]));
-        let grey = one + (at - float(before)).clamp(0.0, 1.0) * (other - one);
-        let sign = if self.bright { 1.0 } else { -1.0 };
-        sign * f64::from(self.strip.scale) * grey
+    /// Reads pixels of a row from the one at or before a position on; returns how far the
+    /// position lies from that towards the next one. Beyond the gauge its last pixel goes on.
+    #[inline(always)]
+    fn fetch(&self, row: usize, from: f64, out: &mut [f32]) -> f32 {
+        let pixels = self.strip.row(row);
+        let of = |pixel: &T| T::float(pixel.add_to(T::Sum::default()));
+        let first = floor(from);
+        let start = usize::try_from(first).ok();
+        if let Some(inside) = start.and_then(|start| pixels.get(start..start + out.len())) {
+            out.iter_mut().zip(inside).for_each(|(out, pixel)| *out = of(pixel));
+        } else {
+            for (out, at) in out.iter_mut().zip(first..) {
+                let at = usize::try_from(at).unwrap_or(0).min(pixels.len() - 1);
+                *out = of(&pixels[at]);
+            }
+        }
+        narrow(from - from.floor())
     }
 
-    /// Grey levels of a row at a position and at each pixel inwards of it, between two
-    /// pixels each; dark beads negated.
-    #[inline(always)]
-    fn read(&self, row: usize, from: f64, out: &mut [f32]) {
-        let pixels = self.strip.row(row);
-        let sign = if self.bright { 1.0 } else { -1.0 };
-        let scale = sign * self.strip.scale;
-        let of = |pixel: &T| scale * T::float(pixel.add_to(T::Sum::default()));
-        let before = from.floor();
-        let share = narrow(from - before);
-        let reach = float(out.len());
-        let (lowest, highest) = if self.bead_after {
-            (before, before + reach)
-        } else {
-            (before + 1.0 - reach, before + 1.0)
-        };
-        if lowest < 0.0 || highest > self.last() {
-            // Beyond the gauge its last pixel goes on.
-            for (k, out) in out.iter_mut().enumerate() {
-                *out = narrow(self.grey(row, from + self.inwards() * float(k)));
-            }
-            return;
-        }
-        let pixels = &pixels[whole(narrow(lowest))..=whole(narrow(highest))];
-        let between = pixels.windows(2).map(|two| {
-            let (one, other) = (of(&two[0]), of(&two[1]));
-            one + share * (other - one)
-        });
-        if self.bead_after {
-            out.iter_mut().zip(between).for_each(|(out, grey)| *out = grey);
-        } else {
-            out.iter_mut().rev().zip(between).for_each(|(out, grey)| *out = grey);
-        }
+    /// Sign by which a bright bead's grey levels and a dark one's are higher than the ground's.
+    fn sign(&self) -> f64 {
+        if self.bright { 1.0 } else { -1.0 }
     }
 
     /// Direction from the edge into the bead.
@@ -157,7 +139,7 @@ pub struct MeanEdge {
     course: Bent,
     half: usize,
     lines: Vec<Option<Located>>,
-    column: Vec<f64>,
+    columns: Vec<Column>,
     spreads: Vec<f32>,
 }
 
@@ -205,25 +187,35 @@ impl MeanEdge {
     /// ground lies within the gauge.
     pub fn pattern<T: Grey>(&mut self, scene: &Scene<'_, T>, line: &StepLine) -> Option<f64> {
         self.take(scene, line);
-        self.spreads.clear();
-        for off in (HALF_PX..GROUND_PX).step_by(COLUMN_PX) {
-            self.column.clear();
-            for row in 0..scene.strip.along {
-                let at = self.course.at(scene.place(row)) - scene.inwards() * float(off);
-                if at < 0.0 || at > scene.last() {
-                    break;
-                }
-                self.column.push(scene.grey(row, at.round()));
-            }
-            if self.column.len() < scene.strip.along {
-                break;
-            }
-            self.spreads.push(narrow(variance_about_line(&self.column)));
-        }
-        if self.spreads.len() < MIN_COLUMNS {
+        let rows = scene.strip.along;
+        let ends = [0, rows - 1].map(|row| self.course.at(scene.place(row)));
+        let room = ends.map(|at| if scene.bead_after { at } else { scene.last() - at });
+        let fits = |off: &usize| float(*off) <= room[0].min(room[1]);
+        let count = (HALF_PX..GROUND_PX).step_by(COLUMN_PX).take_while(fits).count();
+        if count < MIN_COLUMNS {
             return None;
         }
-        rank::median(&mut self.spreads).map(|variance| f64::from(variance).sqrt())
+        self.columns.clear();
+        self.columns.resize(count, Column::default());
+        let last = scene.strip.across - 1;
+        for row in 0..rows {
+            let place = float(row) - 0.5 * float(rows - 1);
+            let at = self.course.at(scene.place(row)) - scene.inwards() * float(HALF_PX);
+            let nearest = whole(narrow(at)).min(last);
+            let pixels = scene.strip.row(row);
+            for (column, off) in self.columns.iter_mut().zip((0..).step_by(COLUMN_PX)) {
+                let at = if scene.bead_after {
+                    nearest.saturating_sub(off)
+                } else {
+                    (nearest + off).min(last)
+                };
+                column.add(place, f64::from(T::float(pixels[at].add_to(T::Sum::default()))));
+            }
+        }
+        self.spreads.clear();
+        self.spreads.extend(self.columns.iter().map(|of| narrow(of.variance_about_line(rows))));
+        let variance = rank::median(&mut self.spreads)?;
+        Some(f64::from(scene.strip.scale * variance.sqrt()))
     }
 
     fn take<T: Grey>(&mut self, scene: &Scene<'_, T>, line: &StepLine) {
@@ -241,42 +233,45 @@ impl MeanEdge {
         table: &StepTable,
     ) -> [f64; BLURS_PX.len()] {
         self.take(scene, line);
-        let start = self.course;
-        BLURS_PX.map(|blur_px| {
-            self.course = start;
-            let weights = Weights::new(table, blur_px, self.half);
-            let found = weights.and_then(|weights| self.descend(scene, &weights, false));
-            found.map_or(f64::INFINITY, |found| found.left_over)
+        let weights = BLURS_PX.map(|blur_px| Weights::new(table, blur_px, self.half));
+        let usual = weights.iter().flatten().take(USUAL_BLUR + 1).last();
+        let is_found = usual.is_some_and(|usual| self.descend(scene, usual, NEAR).is_some());
+        // What other blurs change is the place within the profile, and hardly its direction.
+        let reach = self.half + NEAR_PX;
+        let [profile, ..] = self.means(scene, -float(reach), 2 * reach + 1);
+        weights.map(|weights| {
+            let weights = weights.filter(|_| is_found);
+            weights.and_then(|weights| weights.rest(&profile)).unwrap_or(f64::INFINITY)
         })
     }
 
-    /// Locates the edge with a blur; `None` where there is none.
+    /// Locates the edge that was approached, with a blur; `None` where there is none.
     pub fn locate<T: Grey>(
         &mut self,
         scene: &Scene<'_, T>,
-        line: &StepLine,
         table: &StepTable,
         blur_px: f64,
     ) -> Option<MeanFit> {
-        self.take(scene, line);
         let weights = Weights::new(table, blur_px, self.half)?;
-        let straight = self.descend(scene, &weights, false)?;
+        let straight = self.descend(scene, &weights, TO_THE_END)?;
         let free = whole(narrow((FREE_BLURS * blur_px).ceil()));
-        let [ground, bead] = self.beside(scene, free, 2);
-        let bends = weights.on_ground(&ground).with(weights.on_bead(&bead));
+        let mut beside = self.beside(scene, free);
+        let [_, _, ground] = &beside.ground;
+        let [_, _, bead] = &beside.bead;
+        let bends = weights.on_ground(ground).with(weights.on_bead(bead));
         let bends = bends.variance().sqrt() / straight.step;
-        let found = if straight.bend.abs() > BENDS * bends {
-            self.descend(scene, &weights, true)?
-        } else {
-            straight
-        };
-        let [ground, bead] = self.beside(scene, free, 0);
+        let mut found = straight;
+        if straight.bend.abs() > BENDS * bends {
+            found = self.descend(scene, &weights, Goal { bends: true, ..TO_THE_END })?;
+            beside = self.beside(scene, free);
+        }
+        let ([ground, ..], [bead, ..]) = (&beside.ground, &beside.bead);
         let bead_grey = mean(&bead[..bead.len().min(LEVEL_PX)])?;
-        let contrast = found.step.min(bead_grey - mean(&ground)?);
-        if !weights.is_like(&ground, found.ground, found.step) {
+        let contrast = found.step.min(bead_grey - mean(ground)?);
+        if !weights.is_like(ground, found.ground, found.step) {
             return None;
         }
-        let samples = [weights.on_ground(&ground), weights.on_bead(&bead)];
+        let samples = [weights.on_ground(ground), weights.on_bead(bead)];
         let samples = samples.map(|of| of.over(found.step));
         let shift = samples[0].shift() + samples[1].shift();
         self.gather(scene, &weights, &found, contrast, shift);
@@ -288,7 +283,7 @@ impl MeanEdge {
         &mut self,
         scene: &Scene<'_, T>,
         weights: &Weights,
-        bends: bool,
+        goal: Goal,
     ) -> Option<Descent> {
         let start = self.course.at;
         for _ in 0..MAX_STEPS {
@@ -299,55 +294,67 @@ impl MeanEdge {
             }
             let moves =
                 means.each_ref().map(|mean| scene.inwards() * product(&weights.place, mean) / step);
-            let is_near = moves[0].abs() < LAST_PX && moves[1].abs() < LAST_PX;
-            if is_near && (!bends || moves[2].abs() < LAST_PX) {
-                let left_over = weights.left_over(&means[0]);
+            let unknowns = if goal.bends { &moves[..] } else { &moves[..2] };
+            if unknowns.iter().all(|by| by.abs() < goal.last_px) {
                 let ground = product(&weights.levels[0], &means[0]);
-                return Some(Descent { step, ground, bend: moves[2], left_over });
+                return Some(Descent { step, ground, bend: moves[2] });
             }
             let [at, tilt, bend] = moves.map(|by| by.clamp(-LONGEST_PX, LONGEST_PX));
             self.course.at += at;
             self.course.tilt += tilt;
-            self.course.bend += if bends { bend } else { 0.0 };
+            self.course.bend += if goal.bends { bend } else { 0.0 };
         }
         None
     }
 
     /// Mean over the rows of so many pixels at distances from the course, from one inwards
     /// on, and how it changes with the course's tilt and bend.
-    fn means<T: Grey>(&self, scene: &Scene<'_, T>, first: f64, pixels: usize) -> [Vec<f64>; 3] {
-        let mut means: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; pixels]);
+    fn means<T: Grey>(&self, scene: &Scene<'_, T>, first: f64, pixels: usize) -> Profiles {
+        // The lowest position of the profile, which inwards of a right edge is its last.
+        let reach = if scene.bead_after { 0.0 } else { float(pixels.saturating_sub(1)) };
+        let lowest = scene.inwards() * first - reach;
+        let mut sums: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; pixels]);
         let mut squares = [0.0; 3];
-        let mut greys = vec![0.0_f32; pixels];
-        for row in 0..scene.strip.along {
-            let place = scene.place(row);
-            scene.read(row, self.course.at(place) + scene.inwards() * first, &mut greys);
-            let shares = [1.0, place, bend_at(place)];
-            for ((mean, square), share) in means.iter_mut().zip(&mut squares).zip(shares) {
-                *square += share * share;
-                for (mean, grey) in mean.iter_mut().zip(&greys) {
-                    *mean += share * f64::from(*grey);
+        let mut greys = vec![0.0; pixels + 1];
+        vectors::widest(
+            #[inline(always)]
+            || {
+                for row in 0..scene.strip.along {
+                    let place = scene.place(row);
+                    let shares = [1.0, place, bend_at(place)];
+                    for (square, share) in squares.iter_mut().zip(shares) {
+                        *square += share * share;
+                    }
+                    let between = scene.fetch(row, self.course.at(place) + lowest, &mut greys);
+                    add_row(&mut sums, &greys, between, shares.map(narrow));
                 }
+            },
+        );
+        if !scene.bead_after {
+            for sums in &mut sums {
+                sums.reverse();
             }
         }
-        for (mean, square) in means.iter_mut().zip(squares) {
-            for mean in mean {
-                *mean /= square.max(f64::MIN_POSITIVE);
-            }
-        }
-        means
+        let scale = scene.sign() * f64::from(scene.strip.scale);
+        let mut squares = squares.iter();
+        sums.map(|sums| {
+            let square = squares.next().map_or(1.0, |square| square.max(f64::MIN_POSITIVE));
+            sums.into_iter().map(|sum| scale * f64::from(sum) / square).collect()
+        })
     }
 
     /// The same of ground and bead, free of the flank, as far as they lie in the gauge.
-    fn beside<T: Grey>(&self, scene: &Scene<'_, T>, free: usize, term: usize) -> [Vec<f64>; 2] {
+    fn beside<T: Grey>(&self, scene: &Scene<'_, T>, free: usize) -> Beside {
         let ends = [-1.0, 0.0, 1.0].map(|place| self.course.at(place));
         let nearest = ends.into_iter().fold(f64::INFINITY, f64::min);
         let farthest = ends.into_iter().fold(f64::NEG_INFINITY, f64::max);
         let room = if scene.bead_after { nearest } else { scene.last() - farthest };
         let ground_px = GROUND_PX.min(whole(narrow(room.floor()))).saturating_sub(free);
         let bead_px = BEAD_PX.min(whole(0.5 * scene.width_px)).saturating_sub(free);
-        let sides = [(-float(ground_px + free), ground_px), (float(free), bead_px)];
-        sides.map(|(first, pixels)| std::mem::take(&mut self.means(scene, first, pixels)[term]))
+        Beside {
+            ground: self.means(scene, -float(ground_px + free), ground_px),
+            bead: self.means(scene, float(free), bead_px),
+        }
     }
 
     /// Positions of the caliper lines, less what all are shifted inwards by.
@@ -361,19 +368,25 @@ impl MeanEdge {
     ) {
         self.lines.clear();
         let mut positions = Vec::with_capacity(scene.lines.len());
-        let mut greys = [0.0_f32; WINDOW];
+        let mut greys = [0.0; WINDOW + 1];
+        let greys = &mut greys[..=weights.pixels];
+        // In the order of the pixels of a row.
+        let mut place = weights.place;
+        if !scene.bead_after {
+            place[..weights.pixels].reverse();
+        }
+        let per_grey = scene.sign() * f64::from(scene.strip.scale) / found.step;
         for &(from, to) in scene.lines {
             let (mut aside, mut middle) = (0.0, 0.0);
             for row in from..to {
                 let at = self.course.at(scene.place(row));
                 middle += at / float(to - from);
-                let greys = &mut greys[..=2 * self.half];
-                scene.read(row, at - scene.inwards() * float(self.half), greys);
-                for (weight, grey) in weights.place.iter().zip(greys) {
-                    aside += weight * f64::from(*grey);
+                let between = scene.fetch(row, at - float(self.half), greys);
+                for (weight, pixels) in place.iter().zip(greys.windows(2)) {
+                    aside += weight * f64::from(pixels[0] + between * (pixels[1] - pixels[0]));
                 }
             }
-            let aside = aside / found.step / float(to - from) - shift;
+            let aside = per_grey * aside / float(to - from) - shift;
             positions.push((middle, scene.inwards() * aside));
         }
         let squares: f64 = positions.iter().map(|(_, aside)| aside * aside).sum();
@@ -384,6 +397,30 @@ impl MeanEdge {
     }
 }
 
+/// Mean profile across an edge, outermost pixel first, and how it changes with the
+/// course's tilt and bend \[grey levels\].
+type Profiles = [Vec<f64>; 3];
+
+/// The same of what lies beside an edge.
+#[derive(Debug)]
+struct Beside {
+    ground: Profiles,
+    bead: Profiles,
+}
+
+/// Where a descent ends.
+#[derive(Debug, Clone, Copy)]
+struct Goal {
+    /// Last step \[px\].
+    last_px: f64,
+    /// Whether the course may bend.
+    bends: bool,
+}
+
+const TO_THE_END: Goal = Goal { last_px: LAST_PX, bends: false };
+/// Where the edge is told from none, and the rest is left to another blur.
+const NEAR: Goal = Goal { last_px: 20.0 * LAST_PX, bends: false };
+
 /// Where a descent ended.
 #[derive(Debug, Clone, Copy)]
 struct Descent {
@@ -393,25 +430,46 @@ struct Descent {
     ground: f64,
     /// Bend that is left \[px\].
     bend: f64,
-    /// Sum of the squares that a step leaves of the profile, in that of its height.
-    left_over: f64,
+}
+
+/// Adds the values between the pixels of a row to sums, with the row's shares of them.
+#[inline(always)]
+fn add_row(sums: &mut [Vec<f32>; 3], pixels: &[f32], between: f32, shares: [f32; 3]) {
+    let [mean, tilt, bend] = sums;
+    let pairs = pixels.iter().zip(&pixels[1..]);
+    for (((mean, tilt), bend), (one, other)) in mean.iter_mut().zip(tilt).zip(bend).zip(pairs) {
+        let grey = one + between * (other - one);
+        *mean += shares[0] * grey;
+        *tilt += shares[1] * grey;
+        *bend += shares[2] * grey;
+    }
 }
 
 fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / float(values.len()))
 }
 
-/// Variance of values about the straight line through them.
-fn variance_about_line(values: &[f64]) -> f64 {
-    let count = float(values.len());
-    let middle = (count - 1.0) / 2.0;
-    let mean = values.iter().sum::<f64>() / count;
-    let (mut square, mut across, mut along) = (0.0, 0.0, 0.0);
-    for (k, value) in values.iter().enumerate() {
-        let place = float(k) - middle;
-        square += (value - mean).powi(2);
-        across += place * (value - mean);
-        along += place * place;
+/// Sums over the pixels of a column.
+#[derive(Debug, Clone, Copy, Default)]
+struct Column {
+    sum: f64,
+    squares: f64,
+    /// Of values times their places about the middle row.
+    across: f64,
+}
+
+impl Column {
+    fn add(&mut self, place: f64, value: f64) {
+        self.sum += value;
+        self.squares += value * value;
+        self.across += place * value;
     }
-    (square - across * across / along).max(0.0) / (count - 2.0).max(1.0)
+
+    /// Variance of the values of so many rows about the straight line through them.
+    fn variance_about_line(&self, rows: usize) -> f64 {
+        let count = float(rows);
+        let along = count * (count * count - 1.0) / 12.0;
+        let square = self.squares - self.sum * self.sum / count;
+        (square - self.across * self.across / along).max(0.0) / (count - 2.0).max(1.0)
+    }
 }

@@ -35,6 +35,7 @@ use super::rough::RoughEdge;
 use super::roughness::{CaliperFilter, LocalWidths};
 use super::strip::{Grey, Strip, Strips, Turner, View};
 use super::trace::Tracer;
+use super::vectors;
 use super::width::{Caliper, EdgePlace, Edges, Hints, WidthMeasurement};
 
 /// Share of the caliper lines that must show each of the two edges.
@@ -235,7 +236,13 @@ impl Measurer {
         }
         let view = View::new(self.gauge.roi, self.gauge.axis);
         let strips = self.turner.strips(frame, &view, self.white);
-        pulp::Arch::new().dispatch(Task { work, strips, view: &view, surface })
+        vectors::widest(
+            #[inline(always)]
+            || match strips {
+                Strips::Bytes(strip) => work.measure(&strip, &view, surface),
+                Strips::Words(strip) => work.measure(&strip, &view, surface),
+            },
+        )
     }
 }
 
@@ -254,27 +261,6 @@ fn check_size(image: (usize, usize), surface: &SurfaceMap) -> Result<(), Reject>
     if same { Ok(()) } else { Err(Reject::OtherSize { image, calibrated }) }
 }
 
-/// A measurement as the processor's vectors do it: the same code is compiled
-/// for each width of vectors, and the widest that there is runs.
-struct Task<'a> {
-    work: &'a mut Work,
-    strips: Strips<'a>,
-    view: &'a View,
-    surface: &'a SurfaceMap,
-}
-
-impl pulp::WithSimd for Task<'_> {
-    type Output = Result<WidthMeasurement, Reject>;
-
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
-        match self.strips {
-            Strips::Bytes(strip) => self.work.measure(&strip, self.view, self.surface),
-            Strips::Words(strip) => self.work.measure(&strip, self.view, self.surface),
-        }
-    }
-}
-
 impl Work {
     #[inline(always)]
     fn measure<T: Grey>(
@@ -287,6 +273,12 @@ impl Work {
         self.noise = noise::of(strip, 0..strip.across);
         self.bands.pool(strip, self.gauge.calipers);
         pool::cut(strip.along, self.gauge.calipers, &mut self.lines);
+        self.find_candidates();
+        if self.is_busy()
+            && let Some(textured) = self.measure_busy(strip, range, view, surface)
+        {
+            return textured;
+        }
         match self.measure_steps(strip, range, view, surface) {
             Ok(found) => self.measure_again(found, strip, range, view, surface),
             Err(reject) if may_be_rough(&reject) => self
@@ -332,7 +324,7 @@ impl Work {
         view: &View,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
-        self.find_candidates();
+        self.find_contours();
         let pair = self.find_pair(range)?;
         self.trace(strip, pair)?;
         self.sort_out(pair.bright)?;

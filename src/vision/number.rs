@@ -19,6 +19,13 @@ pub fn narrow(value: f64) -> f32 {
     value as f32
 }
 
+/// The last whole place that is not beyond a position.
+#[expect(clippy::cast_possible_truncation, reason = "positions are some thousand pixels")]
+#[inline(always)]
+pub fn floor(position: f64) -> isize {
+    position.floor() as isize
+}
+
 /// The nearest number of rows or pixels; 0 of less than none.
 #[expect(
     clippy::cast_possible_truncation,

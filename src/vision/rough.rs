@@ -21,6 +21,7 @@ mod route;
 mod window;
 
 use super::coarse::StepLine;
+use super::gauge::EdgeKind;
 use super::number::{float, narrow, whole};
 use super::strip::{Grey, Strip};
 use super::trace::{self, Located};
@@ -74,6 +75,8 @@ pub struct Scene<'a, T> {
     pub bead_after: bool,
     /// Whether the bead is brighter than what lies outside.
     pub bright: bool,
+    /// What the edge looks like.
+    pub edge: EdgeKind,
 }
 
 /// Finds one edge; keeps its memory from frame to frame.
@@ -84,6 +87,7 @@ pub struct RoughEdge {
     levels: Levels,
     crossings: Crossings,
     lines: Vec<Option<Located>>,
+    edge: EdgeKind,
     /// Shape of the mean profile.
     shape: Option<EdgeShape>,
 }
@@ -132,10 +136,11 @@ impl RoughEdge {
     /// Finds the edge near a line; `None` where no edge runs there.
     #[inline(always)]
     pub fn find<T: Grey>(&mut self, scene: &Scene<'_, T>, line: &StepLine) -> Option<()> {
+        self.edge = scene.edge;
         self.windows.read(scene, line);
         self.route.find(&self.windows, scene.width_px)?;
         for _ in 0..ROUNDS {
-            self.levels.read(&self.windows, self.route.rows(), scene.width_px)?;
+            self.levels.read(&self.windows, self.route.rows(), scene)?;
             self.levels.cross(&self.windows, self.route.rows(), &mut self.crossings);
             self.route.follow(&self.crossings.at)?;
         }
@@ -210,6 +215,7 @@ impl RoughEdge {
         let known = groove::Known {
             variance: noise::of_profile(&self.levels)?,
             blur,
+            edge: self.edge,
             roughness: noise::roughness(&self.crossings),
         };
         groove::fit(self.levels.mean()?, &known)

@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::number::{float, narrow};
+use super::super::number::{float, narrow, whole};
 use super::super::rank;
 use super::super::step::StepTable;
-use super::{MIN_HALF_PX, WINDOW};
+use super::{LAST_PX, LONGEST_PX, MAX_STEPS, MIN_HALF_PX, WINDOW};
 
 /// Standard deviations of the ground's level within which that beside an edge is
 /// ground's.
@@ -59,10 +59,41 @@ impl Weights {
         product(&self.levels[1], profile) - product(&self.levels[0], profile)
     }
 
-    /// Sum of the squares that a step leaves of a profile, in that of its height.
-    pub(super) fn left_over(&self, profile: &[f64]) -> f64 {
-        let [ground, bead] = self.levels.map(|weights| product(&weights, profile));
-        let left = profile.iter().zip(&self.bead).take(self.pixels).map(|(value, share)| {
+    /// Descends from the middle of a profile to where the window shows the edge in its own.
+    /// Returns the sum of the squares that a step leaves of it, in that of its height;
+    /// `None` where none lies within the profile.
+    pub(super) fn rest(&self, profile: &[f64]) -> Option<f64> {
+        let room = float(profile.len() - self.pixels);
+        let mut at = 0.5 * room;
+        let mut window = [0.0; WINDOW];
+        let window = &mut window[..self.pixels];
+        for _ in 0..MAX_STEPS {
+            if !(0.0..=room).contains(&at) {
+                return None;
+            }
+            let first = whole(narrow(at.floor())).min(profile.len() - self.pixels);
+            let share = at - float(first);
+            let after = profile[first + 1..].iter().chain(profile.last());
+            for ((value, one), other) in window.iter_mut().zip(&profile[first..]).zip(after) {
+                *value = one + share * (other - one);
+            }
+            let step = self.step(window);
+            if step <= 0.0 {
+                return None;
+            }
+            let by = product(&self.place, window) / step;
+            if by.abs() < LAST_PX {
+                return Some(self.left_over(window));
+            }
+            at += by.clamp(-LONGEST_PX, LONGEST_PX);
+        }
+        None
+    }
+
+    /// Sum of the squares that a step leaves of a window, in that of its height.
+    fn left_over(&self, window: &[f64]) -> f64 {
+        let [ground, bead] = self.levels.map(|weights| product(&weights, window));
+        let left = window.iter().zip(&self.bead).map(|(value, share)| {
             let expected = ground + share * (bead - ground);
             (value - expected).powi(2)
         });

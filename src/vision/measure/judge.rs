@@ -2,6 +2,7 @@
 //! and steps that are too low.
 
 use super::Work;
+use crate::vision::gauge::EdgeKind;
 use crate::vision::ground::{self, Place, Side};
 use crate::vision::number::float;
 use crate::vision::outlier;
@@ -128,7 +129,7 @@ impl Work {
         of_both: fn(f64, f64) -> f64,
     ) -> Result<(), Reject> {
         let noise = f64::from(self.noise);
-        self.is_beside_groove = false;
+        self.is_beside_groove = self.gauge.edge == EdgeKind::Groove;
         let mut strengths = [0.0_f64; 2];
         let sides = [(&mut self.left, -1.0), (&mut self.right, 1.0)];
         for (((tracer, outwards), contrast), strength) in
@@ -141,7 +142,9 @@ impl Work {
             place(tracer, &self.lines, &mut self.places);
             let blur_px = tracer.blur_px;
             let side = Side { places: &self.places, outwards, blur_px, room_px: f64::INFINITY };
-            self.is_beside_groove |= ground::rises(strip, &side, noise, contrast);
+            if self.gauge.edge == EdgeKind::Auto {
+                self.is_beside_groove |= ground::rises(strip, &side, noise, contrast);
+            }
             let Some(pattern) = self.ground.pattern(strip, &side, noise) else { continue };
             *strength = pattern.size_grey / contrast;
             // Rough edges know what the ground beside them leaves open.

@@ -1,5 +1,6 @@
 //! Beads that have a texture, or lie on ground that has a pattern.
 
+use super::choice::has_grains;
 use super::judge::{WHOLE_SHARE, place};
 use super::{NEED_SHARE, Work, even};
 use crate::calib::SurfaceMap;
@@ -46,6 +47,34 @@ impl Work {
         }
         let variance = least * least;
         if variance > TOLD * noise * noise { (variance - noise * noise).sqrt() } else { 0.0 }
+    }
+
+    /// Measures a bead whose texture shows before any edge is located. `None` where none
+    /// does, where it lies on ground of the same kind, and where grains may lie on its edges.
+    #[inline(never)]
+    pub(super) fn measure_busy<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        range: (f32, f32),
+        view: &View,
+        surface: &SurfaceMap,
+    ) -> Option<Result<WidthMeasurement, Reject>> {
+        let pair = self.find_lines(strip, range).ok()?;
+        if !self.is_textured_between_lines(strip, &pair) {
+            return None;
+        }
+        let pattern = self.ground_pattern(strip, &pair);
+        let found = self.measure_patterned((&pair, pattern), strip, view, surface);
+        if !matches!(found, Err(Reject::NoPair { .. })) {
+            return (pattern == 0.0).then_some(found);
+        }
+        let fits = self.fit_rough(strip, &pair).ok()?;
+        if fits.iter().any(has_grains) {
+            return None;
+        }
+        let contrast = fits[0].contrast.min(fits[1].contrast);
+        let checked = check_pattern(pattern / contrast, true);
+        Some(checked.and_then(|()| self.take_rough(&fits, strip, view, surface)))
     }
 
     /// Measures a bead that was measured already, where it or the ground has a pattern.
@@ -140,12 +169,8 @@ impl Work {
         let best = (0..BLURS_PX.len()).min_by(|a, b| left_over(a).total_cmp(&left_over(b)));
         let blur_px = best.filter(|k| left_over(k).is_finite()).map(|k| BLURS_PX[k]);
         let blur_px = blur_px.ok_or(failed)?;
-        let one = left
-            .locate(&scenes[0], &pair.sides[0], self.blur_shapes.lens(), blur_px)
-            .ok_or(failed)?;
-        let other = right
-            .locate(&scenes[1], &pair.sides[1], self.blur_shapes.lens(), blur_px)
-            .ok_or(failed)?;
+        let one = left.locate(&scenes[0], self.blur_shapes.lens(), blur_px).ok_or(failed)?;
+        let other = right.locate(&scenes[1], self.blur_shapes.lens(), blur_px).ok_or(failed)?;
         let got = pattern / one.contrast.min(other.contrast);
         if got > STRONGEST {
             return Err(Reject::Patterned { got, limit: STRONGEST });

@@ -5,13 +5,14 @@ use super::patterned::check_pattern;
 use super::{NEED_SHARE, Work, even};
 use crate::calib::SurfaceMap;
 use crate::vision::coarse::{LinePair, StepLine};
-use crate::vision::gauge::Polarity;
+use crate::vision::gauge::{EdgeKind, Polarity};
 use crate::vision::line::Line;
 use crate::vision::number::{float, narrow};
 use crate::vision::pool;
 use crate::vision::reject::Reject;
 use crate::vision::rough::{RoughFit, Scene};
 use crate::vision::strip::{Grey, Strip, View};
+use crate::vision::vectors;
 use crate::vision::width::WidthMeasurement;
 
 /// The search range allows 1.5 times too wide and too narrow single places; lines
@@ -110,10 +111,15 @@ impl Work {
     ) -> Result<LinePair, Reject> {
         let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
         let range = (LINE_SLACK * range.0, range.1 / LINE_SLACK);
-        self.coarse.look(strip, (range.0 * range.1).sqrt());
+        let usual_px = (range.0 * range.1).sqrt();
+        vectors::widest(
+            #[inline(always)]
+            || self.coarse.look(strip, usual_px),
+        );
         let polarities =
             [self.gauge.polarity != Polarity::Dark, self.gauge.polarity != Polarity::Bright];
-        self.coarse.pairs(range, polarities, &mut self.pairs);
+        let may_be_groove = self.gauge.edge != EdgeKind::Step;
+        self.coarse.pairs(range, polarities, may_be_groove, &mut self.pairs);
         let pair = *self.pairs.first().ok_or(failed)?;
         self.check_stands_out(&pair)?;
         self.check_rivals(&pair)?;
@@ -121,7 +127,7 @@ impl Work {
     }
 
     /// Follows rough edges near two lines.
-    fn fit_rough<T: Grey>(
+    pub(super) fn fit_rough<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
         pair: &LinePair,
@@ -134,11 +140,18 @@ impl Work {
             width_px: pair.width_px(),
             bead_after: true,
             bright: pair.bright,
+            edge: self.gauge.edge,
         };
         let [left, right] = &mut self.rough;
-        left.find(&scene, &pair.sides[0]).ok_or(failed)?;
         let right_scene = Scene { bead_after: false, ..scene };
-        right.find(&right_scene, &pair.sides[1]).ok_or(failed)?;
+        let both = vectors::widest(
+            #[inline(always)]
+            || {
+                left.find(&scene, &pair.sides[0])?;
+                right.find(&right_scene, &pair.sides[1])
+            },
+        );
+        both.ok_or(failed)?;
         let (left_blur, right_blur) = (left.blur(), right.blur());
         let left_fit = left.locate(&scene, right_blur).ok_or(failed)?;
         let right_fit = right.locate(&right_scene, left_blur).ok_or(failed)?;

@@ -22,6 +22,10 @@ const RANGE_SLACK: f64 = 1.5;
 /// deviations.
 const FLOOR_SIGMA: f32 = 3.5;
 
+/// Steps of a band, in the mean, from which on texture or a pattern is likely: a bead has
+/// two, with a groove beside each edge four; textured ones had 22 to 32.
+const BUSY: usize = 10;
+
 /// A pair and its polarity.
 #[derive(Debug, Clone, Copy)]
 pub struct Found {
@@ -60,10 +64,21 @@ impl Work {
             respond(profile, &mut self.response);
             candidates.find(&self.response, floor, unit);
         }
+    }
+
+    /// Lines of candidates along the bead.
+    #[inline(always)]
+    pub(super) fn find_contours(&mut self) {
         #[expect(clippy::cast_precision_loss, reason = "a band has few rows")]
         let band_px = strip_rows(&self.bands) as f32 / self.bands.count().max(1) as f32;
         self.ups.search(&self.candidates, true, band_px, LEAST_SHARE);
         self.downs.search(&self.candidates, false, band_px, LEAST_SHARE);
+    }
+
+    /// Whether so many steps show that texture or a pattern is likely.
+    pub(super) fn is_busy(&self) -> bool {
+        let steps = |of: &Candidates| of.up().len() + of.down().len();
+        self.candidates.iter().map(steps).sum::<usize>() > BUSY * self.candidates.len()
     }
 
     /// The believed widths in pixels across the gauge's middle.

@@ -4,7 +4,7 @@ use crate::frame::Pixels;
 use crate::geometry::{Pose, Roi};
 use crate::time::Stamp;
 use crate::units::Mm;
-use crate::vision::gauge::{Axis, Polarity};
+use crate::vision::gauge::{Axis, EdgeKind, Polarity};
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -12,6 +12,8 @@ use rand_distr::{Distribution, StandardNormal};
 const SIZE: (usize, usize) = (400, 60);
 /// Edges of the bead \[px\].
 const EDGES: [f64; 2] = [60.0, 300.0];
+/// Width of a groove [px].
+const GROOVE_PX: f64 = 2.0;
 
 /// A bead of 150 on 70 with a blur of 1.5 px and a noise of 2.
 fn frame() -> Frame {
@@ -44,6 +46,40 @@ fn gauge(from: usize, to: usize) -> Gauge {
 
 fn measure(gauge: Gauge, surface: &SurfaceMap) -> Result<WidthMeasurement, Reject> {
     Measurer::new(gauge, None).measure(&frame(), surface)
+}
+
+/// Beside each edge of the bead a dark line that is narrower than its blur.
+fn frame_with_grooves(seed: u64) -> Frame {
+    let mut random = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
+    let share = |x: f64| 0.5 * (1.0 + libm::erf(x / (1.5 * std::f64::consts::SQRT_2)));
+    let mut level = |x: u16| {
+        let noise: f64 = StandardNormal.sample(&mut random);
+        let x = f64::from(x);
+        let ground = share(EDGES[0] - GROOVE_PX - x) + share(x - EDGES[1] - GROOVE_PX);
+        15.0 + 135.0 * (share(x - EDGES[0]) - share(x - EDGES[1])) + 55.0 * ground + 2.0 * noise
+    };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "8 bits")]
+    let values = (0..60 * 400u16).map(|k| level(k % 400).round() as u8).collect();
+    Frame::new(0, Stamp::START, SIZE, Pixels::Grey8(values)).unwrap()
+}
+
+/// Half of the height above a groove that blur fills lies inside the bead; who says that
+/// there is none gets that place.
+#[test]
+fn a_given_edge_says_whether_a_dark_line_is_a_groove() {
+    let scale = SurfaceMap::from_scale(1.0);
+    let width = |edge| {
+        let gauge = Gauge { edge, ..gauge(0, 400) };
+        let frames = (1..=20).map(frame_with_grooves);
+        let found =
+            frames.filter_map(|frame| Measurer::new(gauge, None).measure(&frame, &scale).ok());
+        let widths: Vec<f64> = found.map(|found| found.width.get()).collect();
+        assert!(widths.len() > 15, "{edge:?}: {}", widths.len());
+        widths.iter().sum::<f64>() / f64::from(u32::try_from(widths.len()).unwrap())
+    };
+    let [auto, step, groove] = [EdgeKind::Auto, EdgeKind::Step, EdgeKind::Groove].map(width);
+    assert!((groove - 240.0).abs() < 0.2 && (auto - 240.0).abs() < 0.3, "{auto} {groove}");
+    assert!(groove - step > 0.3, "{step} {groove}");
 }
 
 /// Either the gauge shows enough of both edges, or it says so: a step that is

@@ -3,6 +3,7 @@
 //! known of other grooves then says how wide it is.
 
 use super::levels::{LENGTH, MeanProfile, OUTSIDE};
+use crate::vision::gauge::EdgeKind;
 use crate::vision::normal::{Normal, Solved};
 use crate::vision::number::float;
 use nalgebra::SVector;
@@ -99,6 +100,8 @@ pub struct Known {
     pub variance: f64,
     /// Blur of the bead's edge.
     pub blur: Blur,
+    /// What the edge looks like.
+    pub edge: EdgeKind,
     /// Variance of the edge's profile along the bead \[px²\].
     pub roughness: f64,
 }
@@ -252,11 +255,18 @@ pub fn fit(mean: &MeanProfile, known: &Known) -> Option<EdgeShape> {
         let dip = from_narrow.filter(|dip| dip.model.is_dip());
         let step_shape = groove.judge(&step, 0.0);
         let Some(dip) = dip else { return step_shape };
-        let share = 1.0 / (1.0 + libm::exp(0.5 * (DIP_COST + dip.cost - step.cost)));
+        let share = match known.edge {
+            EdgeKind::Auto => 1.0 / (1.0 + libm::exp(0.5 * (DIP_COST + dip.cost - step.cost))),
+            EdgeKind::Step => 0.0,
+            EdgeKind::Groove => 1.0,
+        };
         return match (step_shape, groove.judge(&dip, 1.0)) {
             (Some(step), Some(dip)) => Some(step.or(&dip, share)),
             (step, dip) => dip.or(step),
         };
+    }
+    if known.edge == EdgeKind::Step {
+        return None;
     }
     let missing: f64 = (mean.darkest()..last).map(|k| bead - f64::from(mean.grey[k])).sum();
     let width = (2.0 * missing / (bead - narrow.grey)).clamp(NARROW_PX, 0.5 * WIDTH_PX.1);

@@ -1,11 +1,13 @@
 //! Grey levels on either side of an edge, along its course, and where each row
 //! passes from one to the other.
 
+use super::Scene;
 use super::crossing::{self, Flank};
 use super::kernel;
 use super::route::BLOCK;
 use super::whole;
 use super::window::Windows;
+use crate::vision::gauge::EdgeKind;
 use crate::vision::number::{float, single};
 use crate::vision::rank;
 use crate::vision::sheet::SPAN;
@@ -183,12 +185,20 @@ impl Levels {
 
     /// Reads the levels along a course; `None` where there is no step.
     #[inline(always)]
-    pub fn read(&mut self, windows: &Windows, course: &[f32], width_px: f32) -> Option<()> {
+    pub fn read<T>(
+        &mut self,
+        windows: &Windows,
+        course: &[f32],
+        scene: &Scene<'_, T>,
+    ) -> Option<()> {
         if self.kernels[0].is_empty() {
             self.kernels = [INSIDE_ROWS, OUTSIDE_ROWS].map(|rows| kernel(rows / float(BLOCK)));
         }
         self.align(windows, course);
-        let mean = mean_profile(&self.blocks, width_px)?;
+        let mut mean = mean_profile(&self.blocks, scene.width_px)?;
+        if scene.edge == EdgeKind::Step {
+            mean.filled = 0.0;
+        }
         let [inside, outside] = &self.kernels;
         self.beside.clear();
         let bead = bead_levels(&self.blocks, &mean);

@@ -16,6 +16,8 @@ const REACH_FRACTION: f32 = 0.06;
 const REACH_PX: (f32, f32) = (3.0, 6.0);
 /// How far a course may run aside from one block to the next \[px\].
 const MAX_ASIDE: usize = 8;
+/// Where a course comes from that does not run aside, as [`best_before`] counts.
+const MIDDLE: u8 = 8;
 /// Cost of running aside, in typical steps a pixel: into a tear that is as deep as a
 /// block is long, and out again, for one and a half blocks' own step.
 const ASIDE_COST: f32 = 0.2;
@@ -123,15 +125,16 @@ impl Route {
         let count = self.steps.len();
         self.froms.resize(count, [0; SPAN]);
         for block in 0..count {
-            for k in inside.clone() {
-                let step = self.steps[block][k] / typical;
-                let (best, from) = if block == 0 {
-                    (0.0, MAX_ASIDE)
-                } else {
-                    best_before(&self.scores[block - 1], k, &inside)
-                };
-                self.scores[block][k] = best + step;
-                self.froms[block][k] = u8::try_from(from).unwrap_or(u8::MAX);
+            let (before, here) = self.scores.split_at_mut(block);
+            let (scores, froms) = (&mut here[0], &mut self.froms[block]);
+            if let Some(before) = before.last() {
+                best_before(before, &inside, scores, froms);
+            } else {
+                scores.fill(0.0);
+                froms.fill(MIDDLE);
+            }
+            for (score, step) in scores.iter_mut().zip(&self.steps[block]) {
+                *score += step / typical;
             }
         }
         let last = self.scores.last()?;
@@ -162,18 +165,26 @@ impl Route {
     }
 }
 
-/// Best score of the block before from which a place can be reached, and where it
+/// Best score of the block before from which each place can be reached, and where that
 /// lies: so many pixels more than [`MAX_ASIDE`] before the place.
 #[inline(always)]
-fn best_before(scores: &Row, k: usize, inside: &std::ops::Range<usize>) -> (f32, usize) {
-    let from = inside.start.max(k.saturating_sub(MAX_ASIDE));
-    let to = inside.end.min(k + MAX_ASIDE + 1);
-    let mut best = (f32::NEG_INFINITY, MAX_ASIDE);
-    for (place, score) in (from..to).zip(&scores[from..to]) {
-        let score = score - ASIDE_COST * single(place.abs_diff(k));
-        if score > best.0 {
-            best = (score, place + MAX_ASIDE - k);
+fn best_before(
+    scores: &Row,
+    inside: &std::ops::Range<usize>,
+    best: &mut Row,
+    froms: &mut [u8; SPAN],
+) {
+    let mut padded = [f32::NEG_INFINITY; SPAN + 2 * MAX_ASIDE];
+    padded[MAX_ASIDE..][inside.clone()].copy_from_slice(&scores[inside.clone()]);
+    best.fill(f32::NEG_INFINITY);
+    froms.fill(MIDDLE);
+    for (from, aside) in (0..=2 * MIDDLE).zip(0..) {
+        let cost = ASIDE_COST * f32::from(from.abs_diff(MIDDLE));
+        for ((best, at), score) in best.iter_mut().zip(froms.iter_mut()).zip(&padded[aside..]) {
+            let score = score - cost;
+            let is_better = score > *best;
+            *best = if is_better { score } else { *best };
+            *at = if is_better { from } else { *at };
         }
     }
-    best
 }
