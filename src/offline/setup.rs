@@ -101,8 +101,9 @@ fn on_blur(blur: f64) -> Option<String> {
     (blur > SOFT_PX).then(|| {
         format!(
             "Blur {blur:.1} px: refocus on the top edges of the bead, or shorten the exposure if \
-             it smears. At {BLUR_PX} px widths would scatter {:.0} % less, and a shadow be told \
-             from an edge {:.0} px away, not only {:.0} px.",
+             it smears (torn edges look blurred in focus as well). At {BLUR_PX} px widths of a \
+             smooth bead would scatter {:.0} % less, and a shadow be told from an edge {:.0} px \
+             away, not only {:.0} px.",
             (1.0 - (BLUR_PX / blur).sqrt()) * 100.0,
             APART * BLUR_PX,
             APART * blur

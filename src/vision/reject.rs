@@ -248,7 +248,7 @@ impl fmt::Display for Reject {
             ),
             Self::Patterned { got, limit } => write!(
                 f,
-                "the ground beside the bead varies by {:.0} % of the contrast, {:.0} % is bearable; a plainer ground or light that makes the bead brighter helps",
+                "the ground beside the bead varies by {:.0} % of the contrast, {:.0} % is bearable; a plainer ground helps, or light that sets the bead off more from it",
                 100.0 * got,
                 100.0 * limit
             ),
