@@ -35,10 +35,9 @@ pub enum Method {
 }
 
 /// What the bead's edges look like.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EdgeKind {
     /// Found from the frame.
-    #[default]
     Auto,
     /// A step of brightness: the bead lies on ground that is brighter or darker.
     Step,

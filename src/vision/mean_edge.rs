@@ -88,15 +88,14 @@ impl<T: Grey> Scene<'_, T> {
     #[inline(always)]
     fn fetch(&self, row: usize, from: f64, out: &mut [f32]) -> f32 {
         let pixels = self.strip.row(row);
-        let of = |pixel: &T| T::float(pixel.add_to(T::Sum::default()));
+        let of = |pixel: T| T::float(pixel.add_to(T::Sum::default()));
         let first = floor(from);
         let start = usize::try_from(first).ok();
         if let Some(inside) = start.and_then(|start| pixels.get(start..start + out.len())) {
-            out.iter_mut().zip(inside).for_each(|(out, pixel)| *out = of(pixel));
+            out.iter_mut().zip(inside).for_each(|(out, pixel)| *out = of(*pixel));
         } else {
             for (out, at) in out.iter_mut().zip(first..) {
-                let at = usize::try_from(at).unwrap_or(0).min(pixels.len() - 1);
-                *out = of(&pixels[at]);
+                *out = of(self.strip.nearest(row, at));
             }
         }
         narrow(from - from.floor())

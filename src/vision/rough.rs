@@ -87,7 +87,6 @@ pub struct RoughEdge {
     levels: Levels,
     crossings: Crossings,
     lines: Vec<Option<Located>>,
-    edge: EdgeKind,
     /// Shape of the mean profile.
     shape: Option<EdgeShape>,
 }
@@ -136,7 +135,6 @@ impl RoughEdge {
     /// Finds the edge near a line; `None` where no edge runs there.
     #[inline(always)]
     pub fn find<T: Grey>(&mut self, scene: &Scene<'_, T>, line: &StepLine) -> Option<()> {
-        self.edge = scene.edge;
         self.windows.read(scene, line);
         self.route.find(&self.windows, scene.width_px)?;
         for _ in 0..ROUNDS {
@@ -144,7 +142,7 @@ impl RoughEdge {
             self.levels.cross(&self.windows, self.route.rows(), &mut self.crossings);
             self.route.follow(&self.crossings.at)?;
         }
-        self.shape = self.fit_shape(UNKNOWN_BLUR);
+        self.shape = self.fit_shape(UNKNOWN_BLUR, scene.edge);
         Some(())
     }
 
@@ -170,7 +168,7 @@ impl RoughEdge {
         let (is_groove, on_ground) = (mean.is_groove(), mean.on_ground);
         let (bead_grey, hides_depth) = (mean.bead(), mean.filled > 0.0);
         let known = other.filter(|blur| blur.variance < UNKNOWN_BLUR.variance);
-        let shape = known.and_then(|blur| self.fit_shape(blur)).or(self.shape);
+        let shape = known.and_then(|blur| self.fit_shape(blur, scene.edge)).or(self.shape);
         let is_groove_likely = shape.is_some_and(|shape| shape.groove_share > LIKELY_GROOVE);
         let noise = noise::of_mean(&self.windows, &self.levels, &self.crossings, scene)?;
         // Where a rib or a shade lies within, only the level beside the edge is the bead's.
@@ -211,11 +209,11 @@ impl RoughEdge {
     }
 
     /// Fits a groove or a step to the mean profile.
-    fn fit_shape(&self, blur: Blur) -> Option<EdgeShape> {
+    fn fit_shape(&self, blur: Blur, edge: EdgeKind) -> Option<EdgeShape> {
         let known = groove::Known {
             variance: noise::of_profile(&self.levels)?,
             blur,
-            edge: self.edge,
+            edge,
             roughness: noise::roughness(&self.crossings),
         };
         groove::fit(self.levels.mean()?, &known)

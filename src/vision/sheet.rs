@@ -1,7 +1,7 @@
 //! The gauge straightened along an edge: the pixels around it, one window a few
 //! rows, read once and held against the edge as often as it takes.
 
-use super::number::single;
+use super::number::{floor, single};
 use super::strip::{Grey, Strip};
 
 /// Pixels of a window.
@@ -78,7 +78,7 @@ impl Sheet {
                 let rows = together.min(to - v);
                 let middle = single(2 * v + rows - 1) / 2.0;
                 let expected = expected(middle);
-                let first = floor(expected[0]) - MIDDLE.cast_signed();
+                let first = floor(expected[0].into()) - MIDDLE.cast_signed();
                 self.windows.push(Window { line, rows: single(rows), middle, first, expected });
                 v += rows;
             }
@@ -151,11 +151,6 @@ fn add<T: Grey, const N: usize>(rows: [&[T; SPAN]; N], sums: &mut [T::Sum; SPAN]
             sums[k] = row[k].add_to(sums[k]);
         }
     }
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "a place near the gauge")]
-fn floor(at: f32) -> isize {
-    at.floor() as isize
 }
 
 #[expect(

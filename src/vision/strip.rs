@@ -149,11 +149,15 @@ impl<'a, T: Grey> Strip<'a, T> {
     /// Copies pixels of a row from `start` on; beyond its ends the last one is
     /// repeated.
     pub fn fetch(&self, v: usize, start: isize, out: &mut [T]) {
-        let row = self.row(v);
-        let last = self.across - 1;
         for (value, place) in out.iter_mut().zip(start..) {
-            *value = row[usize::try_from(place).unwrap_or(0).min(last)];
+            *value = self.nearest(v, place);
         }
+    }
+
+    /// The pixel of a row at a place, or the nearest one in the gauge.
+    #[inline(always)]
+    pub fn nearest(&self, v: usize, place: isize) -> T {
+        self.row(v)[usize::try_from(place).unwrap_or(0).min(self.across - 1)]
     }
 }
 

@@ -64,17 +64,14 @@ impl Work {
             return None;
         }
         let pattern = self.ground_pattern(strip, &pair);
-        let found = self.measure_patterned((&pair, pattern), strip, view, surface);
-        if !matches!(found, Err(Reject::NoPair { .. })) {
+        if let Some(found) = self.measure_patterned((&pair, pattern), strip, view, surface) {
             return (pattern == 0.0).then_some(found);
         }
         let fits = self.fit_rough(strip, &pair).ok()?;
         if fits.iter().any(has_grains) {
             return None;
         }
-        let contrast = fits[0].contrast.min(fits[1].contrast);
-        let checked = check_pattern(pattern / contrast, true);
-        Some(checked.and_then(|()| self.take_rough(&fits, strip, view, surface)))
+        Some(self.take_rough_beside(pattern, true, &fits, strip, view, surface))
     }
 
     /// Measures a bead that was measured already, where it or the ground has a pattern.
@@ -100,8 +97,8 @@ impl Work {
             return None;
         }
         let found = self.measure_patterned((&pair, pattern), strip, view, surface);
-        if !matches!(found, Err(Reject::NoPair { .. })) {
-            return Some(found);
+        if found.is_some() {
+            return found;
         }
         let is_whole = self.left.used_share().min(self.right.used_share()) > WHOLE_SHARE;
         let checked = check_pattern(pattern / contrast, is_textured);
@@ -151,8 +148,19 @@ impl Work {
     }
 
     /// Measures a bead whose ground has a pattern of such a standard deviation
-    /// \[grey levels\].
+    /// \[grey levels\]; `None` where the mean profile tells no edges.
     pub(super) fn measure_patterned<T: Grey>(
+        &mut self,
+        lines: (&LinePair, f64),
+        strip: &Strip<'_, T>,
+        view: &View,
+        surface: &SurfaceMap,
+    ) -> Option<Result<WidthMeasurement, Reject>> {
+        let found = self.measure_mean_profile(lines, strip, view, surface);
+        (!matches!(found, Err(Reject::NoPair { .. }))).then_some(found)
+    }
+
+    fn measure_mean_profile<T: Grey>(
         &mut self,
         (pair, pattern): (&LinePair, f64),
         strip: &Strip<'_, T>,
@@ -195,7 +203,7 @@ impl Work {
 
 /// Refuses a bead whose ground has a pattern, a fraction of the contrast, and whose mean
 /// profile tells no edges: parts of the pattern look like bead, and like grooves.
-pub fn check_pattern(got: f64, is_textured: bool) -> Result<(), Reject> {
+pub(super) fn check_pattern(got: f64, is_textured: bool) -> Result<(), Reject> {
     let limit = if is_textured { STRONGEST_OF_SAME } else { STRONGEST_BESIDE_PLAIN };
     if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
 }

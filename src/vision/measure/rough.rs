@@ -44,11 +44,10 @@ impl Work {
         let pair = self.find_lines(strip, range)?;
         let pattern = self.ground_pattern(strip, &pair);
         let is_textured = self.is_textured_between_lines(strip, &pair);
-        if pattern > 0.0 || is_textured {
-            let found = self.measure_patterned((&pair, pattern), strip, view, surface);
-            if !matches!(found, Err(Reject::NoPair { .. })) {
-                return found;
-            }
+        if (pattern > 0.0 || is_textured)
+            && let Some(found) = self.measure_patterned((&pair, pattern), strip, view, surface)
+        {
+            return found;
         }
         // Texture looks like seams and ribs; within a plain bead they are.
         if !is_textured && matches!(refused, Reject::Ambiguous { .. }) {
@@ -58,8 +57,7 @@ impl Work {
         if is_covered(refused) && fits.iter().any(has_grains) {
             return Err(*refused);
         }
-        check_pattern(pattern / fits[0].contrast.min(fits[1].contrast), is_textured)?;
-        self.take_rough(&fits, strip, view, surface)
+        self.take_rough_beside(pattern, is_textured, &fits, strip, view, surface)
     }
 
     /// Looks for a bead with rough edges.
@@ -161,6 +159,21 @@ impl Work {
         }
         even::check(&[left_fit, right_fit], even::middle_grey(strip, pair))?;
         Ok([left_fit, right_fit])
+    }
+
+    /// The same as [`Self::take_rough`] beside a pattern of such a standard deviation
+    /// \[grey levels\], where that is bearable.
+    pub(super) fn take_rough_beside<T: Grey>(
+        &mut self,
+        pattern: f64,
+        is_textured: bool,
+        fits: &[RoughFit; 2],
+        strip: &Strip<'_, T>,
+        view: &View,
+        surface: &SurfaceMap,
+    ) -> Result<WidthMeasurement, Reject> {
+        check_pattern(pattern / fits[0].contrast.min(fits[1].contrast), is_textured)?;
+        self.take_rough(fits, strip, view, surface)
     }
 
     /// The width of the bead whose rough edges were found.

@@ -17,7 +17,8 @@ const REACH_PX: (f32, f32) = (3.0, 6.0);
 /// How far a course may run aside from one block to the next \[px\].
 const MAX_ASIDE: usize = 8;
 /// Where a course comes from that does not run aside, as [`best_before`] counts.
-const MIDDLE: u8 = 8;
+#[expect(clippy::cast_possible_truncation, reason = "a few pixels")]
+const MIDDLE: u8 = MAX_ASIDE as u8;
 /// Cost of running aside, in typical steps a pixel: into a tear that is as deep as a
 /// block is long, and out again, for one and a half blocks' own step.
 const ASIDE_COST: f32 = 0.2;
