@@ -160,7 +160,8 @@ impl Scene<'_> {
             let notable = off > NOTABLE_PX * NOTABLE_PX;
             if notable { corner::turn(&self.points(side), off, self.reach()) } else { 0.0 }
         };
-        if corner::is_corner([turn(0, left), turn(1, right)]) {
+        let of_left = turn(0, left);
+        if of_left != 0.0 && corner::is_corner([of_left, turn(1, right)]) {
             return Err(Reject::Corner { got_widths: 0.0, least_widths: LEAST_RADIUS });
         }
         let square = self.reach() * self.reach();

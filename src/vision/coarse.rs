@@ -31,6 +31,9 @@ const GROOVE_PX: f32 = 40.0;
 const GROOVE_FALL_PX: f32 = 20.0;
 /// Share of a groove's far side that counts for the edge.
 const FAR_SIDE: f32 = 0.5;
+/// What a groove's far side adds to an edge that certainly lies beside one, as a fraction
+/// of the edge's step: a pattern of the ground adds up to 0.37.
+const CERTAIN_GROOVE: f32 = 0.4;
 /// Distance of a seam from an edge \[px\]: nearer lines belong to the edge's flank.
 const SEAM_APART_PX: f32 = 6.0;
 /// [`SEAM_SHARE`] and [`RIVAL_SHARE`] where the stronger pair lies within the other one:
@@ -71,6 +74,12 @@ impl LinePair {
     /// Distance of the two lines in the middle of the gauge \[px\].
     pub fn width_px(&self) -> f32 {
         self.sides[1].at - self.sides[0].at
+    }
+
+    /// Whether a groove certainly lies beside one of the two lines.
+    pub fn is_beside_groove(&self) -> bool {
+        let mut sides = self.sides.iter().zip(self.strengths);
+        sides.any(|(line, strength)| strength > (1.0 + CERTAIN_GROOVE) * line.step)
     }
 }
 
@@ -290,6 +299,7 @@ fn groove(edge: &StepLine, far_sides: Option<&Vec<StepLine>>, outwards: f32) -> 
 }
 
 /// The strongest lines of a sign, each at least `reach` from the others.
+#[inline(always)]
 fn strongest_lines(
     means: &[f32],
     slopes: &[f32],
@@ -298,21 +308,25 @@ fn strongest_lines(
     sign: f32,
     out: &mut Vec<StepLine>,
 ) {
-    // The best slope of every position.
-    let mut best: Vec<(f32, usize)> = vec![(0.0, 0); across];
-    for (number, means) in means.chunks(across).enumerate() {
+    // The strongest step of every position, of all slopes.
+    let mut best = vec![0.0; across];
+    for means in means.chunks(across) {
         for (best, mean) in best.iter_mut().zip(means) {
-            if sign * mean > best.0 {
-                *best = (sign * mean, number);
-            }
+            *best = if sign * mean > *best { sign * mean } else { *best };
         }
     }
     while out.len() < MAX_LINES {
-        let strongest = best.iter().enumerate().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
-        let Some((at, &(step, slope))) = strongest.filter(|(_, best)| best.0 > 0.0) else { return };
-        out.push(StepLine { at: single(at) - 0.5, slope: slopes[slope], step });
+        let strongest = best.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+        let Some((at, &step)) = strongest.filter(|(_, best)| **best > 0.0) else { return };
+        let of_slope = means.chunks(across).zip(slopes);
+        let slope = of_slope.filter(|(means, _)| sign * means[at] >= step).map(|(_, slope)| *slope);
+        out.push(StepLine {
+            at: single(at) - 0.5,
+            slope: slope.min_by(f32::total_cmp).unwrap_or(0.0),
+            step,
+        });
         let near = at.saturating_sub(reach)..(at + reach + 1).min(across);
-        best[near].fill((0.0, 0));
+        best[near].fill(0.0);
     }
 }
 

@@ -149,9 +149,14 @@ impl<'a, T: Grey> Strip<'a, T> {
     /// Copies pixels of a row from `start` on; beyond its ends the last one is
     /// repeated.
     pub fn fetch(&self, v: usize, start: isize, out: &mut [T]) {
-        for (value, place) in out.iter_mut().zip(start..) {
-            *value = self.nearest(v, place);
-        }
+        let row = self.row(v);
+        let missing = usize::try_from(-start).unwrap_or(0).min(out.len());
+        let (before, rest) = out.split_at_mut(missing);
+        before.fill(row[0]);
+        let row = &row[usize::try_from(start).unwrap_or(0).min(row.len())..];
+        let (inside, after) = rest.split_at_mut(row.len().min(rest.len()));
+        inside.copy_from_slice(&row[..inside.len()]);
+        after.fill(self.nearest(v, self.across.cast_signed()));
     }
 
     /// The pixel of a row at a place, or the nearest one in the gauge.

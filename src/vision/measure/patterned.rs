@@ -148,7 +148,7 @@ impl Work {
     }
 
     /// Measures a bead whose ground has a pattern of such a standard deviation
-    /// \[grey levels\]; `None` where the mean profile tells no edges.
+    /// \[grey levels\]; `None` where the mean profile tells no edges, as beside a groove.
     pub(super) fn measure_patterned<T: Grey>(
         &mut self,
         lines: (&LinePair, f64),
@@ -156,6 +156,9 @@ impl Work {
         view: &View,
         surface: &SurfaceMap,
     ) -> Option<Result<WidthMeasurement, Reject>> {
+        if lines.0.is_beside_groove() {
+            return None;
+        }
         let found = self.measure_mean_profile(lines, strip, view, surface);
         (!matches!(found, Err(Reject::NoPair { .. }))).then_some(found)
     }

@@ -139,6 +139,7 @@ impl Work {
             bead_after: true,
             bright: pair.bright,
             edge: self.gauge.edge,
+            table: self.blur_shapes.lens(),
         };
         let [left, right] = &mut self.rough;
         let right_scene = Scene { bead_after: false, ..scene };

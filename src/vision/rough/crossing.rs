@@ -22,11 +22,18 @@ const BEAD: f32 = 0.5;
 /// 1.683 s, over the sum of f·(1 − f) along it, s/√π.
 const FLANK: f32 = 2.983;
 
-/// What a row shows of an edge.
+/// Where a row passes the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
     /// Position of the edge \[px\].
     pub at: f32,
+    /// Pixels that were summed: the first and the last.
+    summed: (usize, usize),
+}
+
+/// What a row shows besides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shown {
     /// Length of the flank \[px\], from a fifth to four fifths of its height.
     pub flank: f32,
     /// Share of the pixels about the edge that are clearly darker than what lies outside
@@ -68,27 +75,49 @@ pub fn of(row: &Row, flank: &Flank) -> Option<Crossing> {
             return None;
         }
     }
-    let (mut sum, mut mixed) = (0.0, 0.0);
-    for value in &row[first..=last] {
-        let fraction = (value - flank.outside) * scale;
-        let shown = fraction.clamp(0.0, 1.0);
-        sum += fraction.clamp(FRACTIONS.0, FRACTIONS.1);
-        mixed += shown * (1.0 - shown);
-    }
-    let end = whole(flank.course + flank.within_px).min(SPAN);
-    let within = (last + GRAIN_PX).min(end)..end;
-    let (odd, odd_within) = (odd_share(&row[first..=last], flank), odd_share(&row[within], flank));
-    Some(Crossing { at: single(last) + 0.5 - sum, flank: FLANK * mixed, odd, odd_within })
+    let share = |pixel: f32| ((pixel - flank.outside) * scale).clamp(FRACTIONS.0, FRACTIONS.1);
+    let at = single(last) + 0.5 - sum_of(&row[first..=last], share);
+    Some(Crossing { at, summed: (first, last) })
 }
 
-/// Share of pixels that show neither the bead nor what lies outside.
+/// What else a row shows whose crossing was found with the same levels.
 #[inline(always)]
-fn odd_share(pixels: &[f32], flank: &Flank) -> f32 {
+pub fn shown(row: &Row, flank: &Flank, Crossing { summed: (first, last), .. }: Crossing) -> Shown {
     let scale = 1.0 / (flank.inside - flank.outside);
-    let fraction = |value: &f32| (value - flank.outside) * scale;
-    let is_odd = |fraction: f32| fraction < ODD.0 || fraction > ODD.1;
-    let odd: f32 = pixels.iter().map(|value| f32::from(u8::from(is_odd(fraction(value))))).sum();
-    odd / single(pixels.len().max(1))
+    let fraction = |pixel: f32| (pixel - flank.outside) * scale;
+    let mixed = |pixel: f32| {
+        let shown = fraction(pixel).clamp(0.0, 1.0);
+        shown * (1.0 - shown)
+    };
+    let is_odd = |pixel: f32| {
+        let fraction = fraction(pixel);
+        if fraction < ODD.0 || fraction > ODD.1 { 1.0 } else { 0.0 }
+    };
+    let odd_share = |pixels: &[f32]| sum_of(pixels, is_odd) / single(pixels.len().max(1));
+    let end = whole(flank.course + flank.within_px).min(SPAN);
+    let about = &row[first..=last];
+    Shown {
+        flank: FLANK * sum_of(about, mixed),
+        odd: odd_share(about),
+        odd_within: odd_share(&row[(last + GRAIN_PX).min(end)..end]),
+    }
+}
+
+/// Sum of what is made of each pixel, in as many sums as fit the processor's vectors.
+#[inline(always)]
+fn sum_of(pixels: &[f32], of: impl Fn(f32) -> f32) -> f32 {
+    let mut sums = [0.0; 8];
+    let chunks = pixels.chunks_exact(sums.len());
+    let rest = chunks.remainder();
+    for chunk in chunks {
+        for (sum, pixel) in sums.iter_mut().zip(chunk) {
+            *sum += of(*pixel);
+        }
+    }
+    for (sum, pixel) in sums.iter_mut().zip(rest) {
+        *sum += of(*pixel);
+    }
+    sums.iter().sum()
 }
 
 #[cfg(test)]
@@ -113,9 +142,11 @@ mod tests {
     fn a_blurred_flank_is_as_long_as_from_a_fifth_to_four_fifths() {
         let sigma = 2.0;
         let height = |u: f32| 0.5 * (1.0 + libm::erff((u - 53.2) / (sigma * 2.0f32.sqrt())));
-        let found = of(&row(|u| 20.0 + 100.0 * height(u)), &FLANK).unwrap();
+        let row = row(|u| 20.0 + 100.0 * height(u));
+        let found = of(&row, &FLANK).unwrap();
         assert!((found.at - 53.2).abs() < 0.01, "{found:?}");
-        assert!((found.flank - 1.683 * sigma).abs() < 0.02, "{found:?}");
+        let shown = shown(&row, &FLANK, found);
+        assert!((shown.flank - 1.683 * sigma).abs() < 0.02, "{shown:?}");
     }
 
     #[test]
@@ -130,8 +161,9 @@ mod tests {
         let step = |u: f32| if u < 58.0 { 20.0 } else { 120.0 };
         let texture = |u: f32| if whole(u).is_multiple_of(3) { 40.0 } else { 0.0 };
         let odd = |of: &dyn Fn(f32) -> f32| {
-            let found = super::of(&row(of), &FLANK).unwrap();
-            found.odd - found.odd_within
+            let row = row(of);
+            let shown = shown(&row, &FLANK, super::of(&row, &FLANK).unwrap());
+            shown.odd - shown.odd_within
         };
         assert!(odd(&step).abs() < 1e-6);
         assert!(odd(&|u| if (50.0..54.0).contains(&u) { -60.0 } else { step(u) }) > 0.1);

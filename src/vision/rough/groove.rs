@@ -6,6 +6,8 @@ use super::levels::{LENGTH, MeanProfile, OUTSIDE};
 use crate::vision::gauge::EdgeKind;
 use crate::vision::normal::{Normal, Solved};
 use crate::vision::number::float;
+use crate::vision::step::StepTable;
+use crate::vision::vectors;
 use nalgebra::SVector;
 
 /// Grey of a groove as a fraction of the bead's, and its standard deviation: grooves of
@@ -23,8 +25,8 @@ const MISFIT: f64 = 0.004;
 /// Rounds of the fit, and the change of position of the groove's
 /// width at which it ends \[px\].
 const ROUNDS: usize = 40;
-const CONVERGED_PX: f64 = 1e-3;
-const CONVERGED_WIDTH_PX: f64 = 0.02;
+const CONVERGED_PX: f64 = 3e-3;
+const CONVERGED_WIDTH_PX: f64 = 0.03;
 /// Largest change of position, width and blur in a round \[px\].
 const STEP_PX: f64 = 0.7;
 /// Largest mean square of the residuals of a groove that is a blurred box.
@@ -66,6 +68,7 @@ pub struct EdgeShape {
     /// How much the bead's level beside the edge differs from that farther inside, in
     /// standard deviations of what light does.
     pub level_off: f64,
+    model: Model,
 }
 
 impl EdgeShape {
@@ -80,6 +83,7 @@ impl EdgeShape {
             groove_share: mean(self.groove_share, other.groove_share),
             blur: if share > 0.5 { other.blur } else { self.blur },
             level_off: mean(self.level_off, other.level_off),
+            model: if share > 0.5 { other.model } else { self.model },
         }
     }
 }
@@ -94,8 +98,10 @@ pub struct Blur {
 }
 
 /// What is known before the fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Known {
+#[derive(Debug, Clone, Copy)]
+pub struct Known<'a> {
+    /// A blurred step.
+    pub table: &'a StepTable,
     /// Variance of the mean profile for each pixel across \[grey levels²\].
     pub variance: f64,
     /// Blur of the bead's edge.
@@ -104,10 +110,12 @@ pub struct Known {
     pub edge: EdgeKind,
     /// Variance of the edge's profile along the bead \[px²\].
     pub roughness: f64,
+    /// What was found in the same profile with another blur.
+    pub before: Option<EdgeShape>,
 }
 
 /// A dark line between two levels, blurred.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Model {
     /// Where the bead begins \[px\].
     at: f64,
@@ -152,10 +160,11 @@ impl Model {
 
     /// Value at a place, and its derivatives by position, width, blur, level beyond,
     /// level in the groove, level of the bead, the far side's variance, and slope.
-    fn value(&self, place: f64) -> (f64, [f64; UNKNOWNS]) {
+    #[inline(always)]
+    fn value(&self, place: f64, table: &StepTable) -> (f64, [f64; UNKNOWNS]) {
         let far_blur = (self.blur * self.blur + self.apart).sqrt();
-        let near = Edge::of(place - self.at, self.blur);
-        let far = Edge::of(place - self.at + self.width, far_blur);
+        let near = Edge::of(place - self.at, self.blur, table);
+        let far = Edge::of(place - self.at + self.width, far_blur, table);
         let (up, down) = (self.bead - self.grey, self.beyond - self.grey);
         let (outside, away) = (1.0 - near.share, self.at - place);
         let shade = self.slope * away;
@@ -183,10 +192,11 @@ struct Edge {
 }
 
 impl Edge {
-    fn of(off: f64, blur: f64) -> Self {
+    #[inline(always)]
+    fn of(off: f64, blur: f64, table: &StepTable) -> Self {
         let u = off / blur;
-        let share = 0.5 * libm::erfc(-u * std::f64::consts::FRAC_1_SQRT_2);
-        let slope = libm::exp(-0.5 * u * u) / (blur * (2.0 * std::f64::consts::PI).sqrt());
+        let (share, density) = table.at(u);
+        let slope = density / blur;
         Self { share, slope, by_blur: -u * slope }
     }
 }
@@ -194,6 +204,7 @@ impl Edge {
 /// What is fitted, and how what is known weighs in.
 #[derive(Clone, Copy)]
 struct Problem<'a> {
+    table: &'a StepTable,
     mean: &'a MeanProfile,
     /// First place and the one after the last.
     places: (usize, usize),
@@ -214,7 +225,7 @@ struct Fitted {
 
 /// Fits a dark line to the mean profile across an edge, or a step where the ground beside
 /// it shows none. `None` where the bead is not brighter than black, or neither fits.
-pub fn fit(mean: &MeanProfile, known: &Known) -> Option<EdgeShape> {
+pub fn fit(mean: &MeanProfile, known: &Known<'_>) -> Option<EdgeShape> {
     let bead = mean.bead();
     if bead <= 0.0 {
         return None;
@@ -245,14 +256,14 @@ pub fn fit(mean: &MeanProfile, known: &Known) -> Option<EdgeShape> {
         if mean.on_ground { BEYOND_SLOPE * bead } else { BEYOND_SLOPE * APART_PX2 },
     ];
     let weight = 1.0 / (known.variance + (MISFIT * bead).powi(2));
-    let groove = Problem { mean, places: (first, last), weight, prior: narrow, sigmas };
-    let from_narrow = groove.descend(narrow);
+    let (table, places) = (known.table, (first, last));
+    let groove = Problem { table, mean, places, weight, prior: narrow, sigmas };
     if mean.on_ground {
         let step = Model { width: WIDTH_PX.1, grey: narrow.beyond, ..narrow };
         let sigmas =
             [sigmas[0], APART_PX2, sigmas[2], sigmas[3], bead, sigmas[5], APART_PX2, sigmas[7]];
         let step = Problem { prior: step, sigmas, ..groove }.descend(step)?;
-        let dip = from_narrow.filter(|dip| dip.model.is_dip());
+        let dip = groove.descend(narrow).filter(|dip| dip.model.is_dip());
         let step_shape = groove.judge(&step, 0.0);
         let Some(dip) = dip else { return step_shape };
         let share = match known.edge {
@@ -268,12 +279,20 @@ pub fn fit(mean: &MeanProfile, known: &Known) -> Option<EdgeShape> {
     if known.edge == EdgeKind::Step {
         return None;
     }
-    let missing: f64 = (mean.darkest()..last).map(|k| bead - f64::from(mean.grey[k])).sum();
-    let width = (2.0 * missing / (bead - narrow.grey)).clamp(NARROW_PX, 0.5 * WIDTH_PX.1);
-    let from_wide = groove.descend(Model { width, ..narrow });
-    let fitted = [from_narrow, from_wide].into_iter().flatten();
+    let starts = match known.before {
+        Some(shape) => [Some(shape.model), None],
+        None => [Some(narrow), Some(wide(mean, narrow, last))],
+    };
+    let fitted = starts.into_iter().flatten().filter_map(|start| groove.descend(start));
     let best = fitted.min_by(|one, other| one.cost.total_cmp(&other.cost))?;
     groove.judge(&best, 1.0)
+}
+
+/// The same groove as wide as the grey that is missing up to a place.
+fn wide(mean: &MeanProfile, narrow: Model, last: usize) -> Model {
+    let Model { bead, grey, .. } = narrow;
+    let missing: f64 = (mean.darkest()..last).map(|k| bead - f64::from(mean.grey[k])).sum();
+    Model { width: (2.0 * missing / (bead - grey)).clamp(NARROW_PX, 0.5 * WIDTH_PX.1), ..narrow }
 }
 
 /// Brightest level from a place on up to the darkest one \[grey levels\].
@@ -287,12 +306,17 @@ impl Problem<'_> {
     fn solve(&self, model: &Model) -> Option<Fitted> {
         let mut normal = Normal::<UNKNOWNS>::default();
         let (mut squares, mut held) = (0.0, 0.0);
-        for k in self.places.0..self.places.1 {
-            let (value, row) = model.value(float(k));
-            let miss = f64::from(self.mean.grey[k]) - value;
-            squares += self.weight * miss * miss;
-            normal.add(row, miss, self.weight);
-        }
+        vectors::widest(
+            #[inline(always)]
+            || {
+                for k in self.places.0..self.places.1 {
+                    let (value, row) = model.value(float(k), self.table);
+                    let miss = f64::from(self.mean.grey[k]) - value;
+                    squares += self.weight * miss * miss;
+                    normal.add(row, miss, self.weight);
+                }
+            },
+        );
         let (values, priors) = (model.unknowns(), self.prior.unknowns());
         for (which, sigma) in self.sigmas.iter().enumerate() {
             let miss = priors[which] - values[which];
@@ -340,7 +364,8 @@ impl Problem<'_> {
         let blur = Blur { px: model.blur, variance: solved.variance(2) * inflation };
         let variance = solved.variance(0) * inflation;
         let level_off = (model.bead - self.prior.bead).abs() / self.sigmas[5];
-        let shape = EdgeShape { at: model.at, variance, groove_share, blur, level_off };
+        let model = *model;
+        let shape = EdgeShape { at: model.at, variance, groove_share, blur, level_off, model };
         (misfit < MAX_MISFIT).then_some(shape)
     }
 }

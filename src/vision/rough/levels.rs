@@ -2,11 +2,10 @@
 //! passes from one to the other.
 
 use super::Scene;
-use super::crossing::{self, Flank};
+use super::crossing::{self, Crossing, Flank};
 use super::kernel;
-use super::route::BLOCK;
 use super::whole;
-use super::window::Windows;
+use super::window::{BLOCK_ROWS, Windows};
 use crate::vision::gauge::EdgeKind;
 use crate::vision::number::{float, single};
 use crate::vision::rank;
@@ -66,6 +65,9 @@ const FILLED: (f32, f32) = (0.87, 1.0);
 /// shade, or a lens's or a compression's.
 const ENCLOSED: (f32, f32) = (0.4, 0.6);
 
+/// Pixels of a profile that may lie outside, in whole vectors of the processor.
+const AROUND: usize = (OUTSIDE + 1).next_multiple_of(8);
+
 /// The mean profile across an edge, from [`OUTSIDE`] pixels before it on.
 pub type Profile = [f32; LENGTH];
 
@@ -73,7 +75,9 @@ pub type Profile = [f32; LENGTH];
 #[derive(Debug, Clone, Default)]
 pub struct Levels {
     blocks: Vec<Profile>,
-    smooth: Vec<Profile>,
+    /// Rows of a block.
+    block: usize,
+    smooth: Vec<[f32; AROUND]>,
     beside: Vec<BlockLevels>,
     mean: Option<MeanProfile>,
     /// Kernels of the smoothing for the levels inside and outside.
@@ -95,6 +99,8 @@ pub struct Crossings {
     pub odd_within: Vec<f32>,
     /// Mean distance of the edge from the course, rounded to pixels \[px\].
     pub off_course: f64,
+    /// What was found of a row.
+    found: Vec<Option<Crossing>>,
 }
 
 /// Levels about one block of rows.
@@ -192,8 +198,9 @@ impl Levels {
         scene: &Scene<'_, T>,
     ) -> Option<()> {
         if self.kernels[0].is_empty() {
-            self.kernels = [INSIDE_ROWS, OUTSIDE_ROWS].map(|rows| kernel(rows / float(BLOCK)));
+            self.kernels = [INSIDE_ROWS, OUTSIDE_ROWS].map(|rows| kernel(rows / float(BLOCK_ROWS)));
         }
+        self.block = windows.block();
         self.align(windows, course);
         let mut mean = mean_profile(&self.blocks, scene.width_px)?;
         if scene.edge == EdgeKind::Step {
@@ -202,10 +209,8 @@ impl Levels {
         let [inside, outside] = &self.kernels;
         self.beside.clear();
         let bead = bead_levels(&self.blocks, &mean);
-        self.beside.extend((0..bead.len()).map(|block| BlockLevels {
-            inside: smooth_level(&bead, block, inside),
-            ..BlockLevels::default()
-        }));
+        let bead = smooth_levels(&bead, inside);
+        self.beside.extend(bead.map(|inside| BlockLevels { inside, ..BlockLevels::default() }));
         smooth(&self.blocks, outside, &mut self.smooth);
         for (levels, profile) in self.beside.iter_mut().zip(&self.smooth) {
             levels.read_outside(profile, &mean);
@@ -218,10 +223,17 @@ impl Levels {
     #[inline(always)]
     fn align(&mut self, windows: &Windows, course: &[f32]) {
         self.blocks.clear();
-        for (rows, course) in windows.all().chunks(BLOCK).zip(course.chunks(BLOCK)) {
+        for (rows, course) in windows.all().chunks(self.block).zip(course.chunks(self.block)) {
             let mut sums = [0.0; LENGTH];
             for (row, &at) in rows.iter().zip(course) {
                 let start = whole(at.max(0.0)).cast_signed() - OUTSIDE.cast_signed();
+                let within = usize::try_from(start).ok().and_then(|start| row.get(start..));
+                if let Some(pixels) = within.and_then(<[f32]>::first_chunk::<LENGTH>) {
+                    for (sum, pixel) in sums.iter_mut().zip(pixels) {
+                        *sum += pixel;
+                    }
+                    continue;
+                }
                 for (k, sum) in (start..).zip(&mut sums) {
                     *sum += row[k.clamp(0, SPAN.cast_signed() - 1).unsigned_abs()];
                 }
@@ -234,41 +246,55 @@ impl Levels {
         }
     }
 
-    /// Where each row passes from outside to the bead, and how long its flank is
-    /// \[px\]; not numbers where it does not.
+    /// Where each row passes from outside to the bead; not a number where it does not.
     #[inline(always)]
     pub fn cross(&self, windows: &Windows, course: &[f32], out: &mut Crossings) {
+        out.found.clear();
         out.at.clear();
-        out.flank.clear();
-        out.gap.clear();
-        out.odd.clear();
-        out.odd_within.clear();
-        let (mut sum, mut seen) = (0.0, 0.0);
-        let ground =
-            self.mean.filter(|mean| mean.on_ground).map(|mean| mean.outside.1 - GROUND_PX / 2);
-        let within_px = self.mean.map_or(0.0, |mean| single(mean.inside.1 - OUTSIDE));
-        for (number, (row, &at)) in windows.all().iter().zip(course).enumerate() {
-            let levels = self.between(number);
-            let start = ground.unwrap_or(levels.darkest);
-            let flank = Flank {
-                start: at + single(start) - single(OUTSIDE),
-                outside: levels.outside - self.hidden_depth(&levels),
-                inside: levels.inside,
-                course: at,
-                within_px,
-            };
-            let found = crossing::of(row, &flank);
+        // A closure would not be compiled for the processor's vectors.
+        for (row, (pixels, &at)) in windows.all().iter().zip(course).enumerate() {
+            let found = crossing::of(pixels, &self.flank(row, at));
+            out.found.push(found);
             out.at.push(found.map_or(f32::NAN, |found| found.at));
-            out.flank.push(found.map_or(f32::NAN, |found| found.flank));
-            out.odd.push(found.map_or(f32::NAN, |found| found.odd));
-            out.odd_within.push(found.map_or(f32::NAN, |found| found.odd_within));
-            out.gap.push(found.map_or(f32::NAN, |found| found.at - flank.start));
-            if let Some(found) = found {
-                sum += f64::from(found.at - at.max(0.0).round());
-                seen += 1.0;
-            }
         }
-        out.off_course = sum / f64::max(seen, 1.0);
+    }
+
+    /// What else the rows show whose crossings were found along the same course.
+    #[inline(always)]
+    pub fn describe(&self, windows: &Windows, course: &[f32], out: &mut Crossings) {
+        let Crossings { at: _, flank, gap, odd, odd_within, off_course, found } = out;
+        for values in [&mut *flank, gap, odd, odd_within] {
+            values.clear();
+            values.resize(found.len(), f32::NAN);
+        }
+        let (mut sum, mut seen) = (0.0, 0.0);
+        for (row, (found, &at)) in found.iter().zip(course).enumerate() {
+            let Some(found) = *found else { continue };
+            let levels = self.flank(row, at);
+            let shown = crossing::shown(&windows.all()[row], &levels, found);
+            flank[row] = shown.flank;
+            gap[row] = found.at - levels.start;
+            odd[row] = shown.odd;
+            odd_within[row] = shown.odd_within;
+            sum += f64::from(found.at - at.max(0.0).round());
+            seen += 1.0;
+        }
+        *off_course = sum / f64::max(seen, 1.0);
+    }
+
+    /// Levels about a row at which the course passes such a position \[px\].
+    #[inline(always)]
+    fn flank(&self, row: usize, course: f32) -> Flank {
+        let levels = self.between(row);
+        let ground = self.mean.filter(|mean| mean.on_ground);
+        let start = ground.map_or(levels.darkest, |mean| mean.outside.1 - GROUND_PX / 2);
+        Flank {
+            start: course + single(start) - single(OUTSIDE),
+            outside: levels.outside - self.hidden_depth(&levels),
+            inside: levels.inside,
+            course,
+            within_px: self.mean.map_or(0.0, |mean| single(mean.inside.1 - OUTSIDE)),
+        }
     }
 
     /// How much deeper than it looks a groove is taken to be \[grey levels\].
@@ -280,9 +306,10 @@ impl Levels {
     }
 
     /// Levels at a row, between those of the two blocks beside it.
+    #[inline(always)]
     fn between(&self, row: usize) -> BlockLevels {
         let last = self.beside.len() - 1;
-        let place = ((single(row) + 0.5) / single(BLOCK) - 0.5).clamp(0.0, single(last));
+        let place = ((single(row) + 0.5) / single(self.block) - 0.5).clamp(0.0, single(last));
         let before = whole(place.floor()).min(last);
         let (one, other) = (self.beside[before], self.beside[(before + 1).min(last)]);
         let fraction = place - single(before);
@@ -381,7 +408,7 @@ fn filled(grey: &Profile, floor: (usize, usize), bead: f32) -> f32 {
 }
 
 impl BlockLevels {
-    fn read_outside(&mut self, profile: &Profile, mean: &MeanProfile) {
+    fn read_outside(&mut self, profile: &[f32; AROUND], mean: &MeanProfile) {
         self.darkest = darkest_of(profile, mean.outside.0.saturating_sub(3));
         self.outside =
             if mean.on_ground { mean_of(profile, mean.ground()) } else { profile[self.darkest] };
@@ -395,11 +422,14 @@ struct BeadLevel {
     places: f32,
 }
 
-/// Levels of the bead itself: places that show a hole in it are passed over.
+/// Levels of the bead itself: places that show a hole in it are passed over. Every fourth
+/// place tells what a hole is.
 fn bead_levels(blocks: &[Profile], mean: &MeanProfile) -> Vec<BeadLevel> {
     let (from, to) = mean.inside;
-    let mut values: Vec<f32> =
-        blocks.iter().flat_map(|profile| &profile[from..to]).copied().collect();
+    let mut values = Vec::with_capacity(blocks.len() * (to - from).div_ceil(4));
+    for profile in blocks {
+        values.extend(profile[from..to].chunks(4).map(|places| places[0]));
+    }
     let median = rank::median(&mut values).unwrap_or(0.0);
     for value in &mut values {
         *value = (*value - median).abs();
@@ -418,47 +448,62 @@ fn bead_levels(blocks: &[Profile], mean: &MeanProfile) -> Vec<BeadLevel> {
     blocks.iter().map(of_block).collect()
 }
 
-/// The bead's level about a block, by a kernel over the blocks on either side.
-fn smooth_level(levels: &[BeadLevel], block: usize, kernel: &[f32]) -> f32 {
-    let half = kernel.len() - 1;
-    let (mut sum, mut total) = (0.0, 0.0);
-    let near = block.saturating_sub(half)..(block + half + 1).min(levels.len());
-    for (other, level) in near.clone().zip(&levels[near]) {
-        let weight = kernel[other.abs_diff(block)] * level.places;
-        sum += weight * level.grey;
-        total += weight;
-    }
-    if total > 0.0 { sum / total } else { levels[block].grey }
+/// The bead's level about each block, by a kernel over the blocks on either side.
+#[inline(always)]
+fn smooth_levels(levels: &[BeadLevel], kernel: &[f32]) -> impl Iterator<Item = f32> {
+    let products: Vec<f32> = levels.iter().map(|level| level.places * level.grey).collect();
+    let places: Vec<f32> = levels.iter().map(|level| level.places).collect();
+    let (sums, totals) = (smooth_values(&products, kernel), smooth_values(&places, kernel));
+    let own = levels.iter().map(|level| level.grey);
+    sums.into_iter().zip(totals).zip(own).map(
+        |((sum, total), own)| {
+            if total > 0.0 { sum / total } else { own }
+        },
+    )
 }
 
-/// Smooths the blocks' profiles along the bead.
+/// Sums of values about each, by a kernel.
 #[inline(always)]
-fn smooth(blocks: &[Profile], kernel: &[f32], out: &mut Vec<Profile>) {
+fn smooth_values(values: &[f32], kernel: &[f32]) -> Vec<f32> {
+    let mut sums: Vec<f32> = values.iter().map(|value| kernel[0] * value).collect();
+    for (offset, weight) in kernel.iter().enumerate().take(values.len()).skip(1) {
+        for (sum, after) in sums.iter_mut().zip(&values[offset..]) {
+            *sum += weight * after;
+        }
+        for (sum, before) in sums[offset..].iter_mut().zip(values) {
+            *sum += weight * before;
+        }
+    }
+    sums
+}
+
+/// Smooths what lies outside in the blocks' profiles along the bead.
+#[inline(always)]
+fn smooth(blocks: &[Profile], kernel: &[f32], out: &mut Vec<[f32; AROUND]>) {
     let half = kernel.len() - 1;
-    out.resize(blocks.len(), [0.0; LENGTH]);
+    out.resize(blocks.len(), [0.0; AROUND]);
     for (block, out) in out.iter_mut().enumerate() {
-        out.fill(0.0);
-        let mut total = 0.0;
+        let (mut sums, mut total) = ([0.0; AROUND], 0.0);
         let near = block.saturating_sub(half)..(block + half + 1).min(blocks.len());
         for (other, profile) in near.clone().zip(&blocks[near]) {
             let weight = kernel[other.abs_diff(block)];
             total += weight;
-            for k in 0..LENGTH {
-                out[k] += weight * profile[k];
+            for k in 0..AROUND {
+                sums[k] += weight * profile[k];
             }
         }
-        for value in out.iter_mut() {
-            *value /= total;
+        for (out, sum) in out.iter_mut().zip(sums) {
+            *out = sum / total;
         }
     }
 }
 
 /// Darkest place outside, from a place on.
-fn darkest_of(profile: &Profile, from: usize) -> usize {
+fn darkest_of(profile: &[f32], from: usize) -> usize {
     let places = from..=OUTSIDE;
     places.min_by(|&a, &b| profile[a].total_cmp(&profile[b])).unwrap_or(OUTSIDE)
 }
 
-fn mean_of(profile: &Profile, (from, to): (usize, usize)) -> f32 {
+fn mean_of(profile: &[f32], (from, to): (usize, usize)) -> f32 {
     profile[from..to].iter().sum::<f32>() / single(to - from)
 }

@@ -10,9 +10,6 @@ use crate::vision::strip::Grey;
 
 /// Blocks over which texture is taken to be correlated at most.
 const MAX_LAG: usize = 6;
-/// Rows over which the smoothing along the bead follows no changes: two standard
-/// deviations.
-const FINE_ROWS: usize = 5;
 /// Fraction of the irregular length of a flank by which an edge may lie elsewhere
 /// in it: half, were the flank an even ramp.
 const FLANK_FRACTION: f64 = 0.25;
@@ -109,9 +106,9 @@ pub fn roughness(crossings: &Crossings) -> f64 {
     (squares[0] - squares[1]).max(0.0) / f64::max(count, 1.0)
 }
 
-/// Mean square by which an edge's profile changes over [`FINE_ROWS`] rows \[px²\].
-pub fn fine_roughness(crossings: &Crossings) -> f64 {
-    let pairs = crossings.at.iter().zip(crossings.at.iter().skip(FINE_ROWS));
+/// Mean square by which an edge's profile changes over so many rows \[px²\].
+pub fn fine_roughness(crossings: &Crossings, rows: usize) -> f64 {
+    let pairs = crossings.at.iter().zip(crossings.at.iter().skip(rows));
     let (mut sum, mut count) = (0.0, 0.0);
     for (one, other) in pairs.filter(|(one, other)| one.is_finite() && other.is_finite()) {
         sum += f64::from(other - one).powi(2);
@@ -182,12 +179,12 @@ fn irregularity(flanks: &[f32]) -> f64 {
         return 0.0;
     }
     let mean = seen().sum::<f64>() / float(count);
-    let off = |row: usize| {
-        let flank = flanks[row];
-        if flank.is_finite() { f64::from(flank) - mean } else { 0.0 }
-    };
+    let off =
+        flanks.iter().map(|&flank| if flank.is_finite() { f64::from(flank) - mean } else { 0.0 });
+    let off: Vec<f64> = off.collect();
     let covariance = |lag: usize| {
-        (lag..flanks.len()).map(|row| off(row) * off(row - lag)).sum::<f64>() / float(count)
+        let pairs = off.iter().zip(&off[lag..]);
+        pairs.map(|(one, other)| one * other).sum::<f64>() / float(count)
     };
     let mut sum = covariance(0);
     for lag in 1..flanks.len() / 4 {

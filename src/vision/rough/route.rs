@@ -7,8 +7,6 @@ use crate::vision::number::single;
 use crate::vision::rank;
 use crate::vision::sheet::SPAN;
 
-/// Rows of a block.
-pub const BLOCK: usize = 4;
 /// Pixels on either side that are compared for a step, as a fraction of the
 /// bead's width: wide against texture, narrow against the bead.
 const REACH_FRACTION: f32 = 0.06;
@@ -16,9 +14,6 @@ const REACH_FRACTION: f32 = 0.06;
 const REACH_PX: (f32, f32) = (3.0, 6.0);
 /// How far a course may run aside from one block to the next \[px\].
 const MAX_ASIDE: usize = 8;
-/// Where a course comes from that does not run aside, as [`best_before`] counts.
-#[expect(clippy::cast_possible_truncation, reason = "a few pixels")]
-const MIDDLE: u8 = MAX_ASIDE as u8;
 /// Cost of running aside, in typical steps a pixel: into a tear that is as deep as a
 /// block is long, and out again, for one and a half blocks' own step.
 const ASIDE_COST: f32 = 0.2;
@@ -34,7 +29,6 @@ const MAX_CORRIDOR_PX: f32 = 40.0;
 pub struct Route {
     steps: Vec<Row>,
     scores: Vec<Row>,
-    froms: Vec<[u8; SPAN]>,
     strongest: Vec<f32>,
     blocks: Vec<f32>,
     rows: Vec<f32>,
@@ -56,7 +50,9 @@ impl Route {
         let half = whole(corridor).clamp(2, middle - reach - 1);
         let inside = middle - half..middle + half + 1;
         self.respond(windows, reach);
-        self.link(inside)
+        self.link(inside)?;
+        self.draw(windows.block());
+        Some(())
     }
 
     /// Takes over positions that were found, and fills the rows without one.
@@ -67,6 +63,11 @@ impl Route {
                 continue;
             }
             let (from, start) = last.map_or((0, at), |last| (last, self.rows[last]));
+            if number == from + 1 {
+                self.rows[number] = at;
+                last = Some(number);
+                continue;
+            }
             let span = single((number - from).max(1));
             for between in from..=number {
                 self.rows[between] = start + (at - start) * single(between - from) / span;
@@ -83,10 +84,10 @@ impl Route {
     /// those before it, over three blocks with weights 1, 2, 1.
     #[inline(always)]
     fn respond(&mut self, windows: &Windows, reach: usize) {
-        let count = windows.count().div_ceil(BLOCK);
+        let count = windows.count().div_ceil(windows.block());
         self.scores.resize(count, [0.0; SPAN]);
         self.steps.resize(count, [0.0; SPAN]);
-        for (rows, sums) in windows.all().chunks(BLOCK).zip(&mut self.scores) {
+        for (rows, sums) in windows.all().chunks(windows.block()).zip(&mut self.scores) {
             sums.fill(0.0);
             for row in rows {
                 for k in 0..SPAN {
@@ -123,16 +124,12 @@ impl Route {
         self.strongest.extend(self.steps.iter().map(most));
         let rank = whole(TYPICAL * single(self.strongest.len().saturating_sub(1)));
         let typical = rank::at(&mut self.strongest, rank).filter(|&step| step > 0.0)?;
-        let count = self.steps.len();
-        self.froms.resize(count, [0; SPAN]);
-        for block in 0..count {
+        for block in 0..self.steps.len() {
             let (before, here) = self.scores.split_at_mut(block);
-            let (scores, froms) = (&mut here[0], &mut self.froms[block]);
-            if let Some(before) = before.last() {
-                best_before(before, &inside, scores, froms);
-            } else {
-                scores.fill(0.0);
-                froms.fill(MIDDLE);
+            let scores = &mut here[0];
+            match before.last() {
+                Some(before) => best_before(before, &inside, scores),
+                None => scores.fill(0.0),
             }
             for (score, step) in scores.iter_mut().zip(&self.steps[block]) {
                 *score += step / typical;
@@ -141,22 +138,23 @@ impl Route {
         let last = self.scores.last()?;
         let mut at = inside.clone().max_by(|&a, &b| last[a].total_cmp(&last[b]))?;
         self.blocks.clear();
-        for block in (0..count).rev() {
+        for scores in self.scores.iter().rev() {
+            if !self.blocks.is_empty() {
+                at = came_from(scores, &inside, at);
+            }
             // A step at k lies between the pixels k − 1 and k.
             self.blocks.push(single(at) - 0.5);
-            at = (at + usize::from(self.froms[block][at])).saturating_sub(MAX_ASIDE);
         }
         self.blocks.reverse();
-        self.draw();
         Some(())
     }
 
-    /// Straight lines between the blocks' middles.
-    fn draw(&mut self) {
+    /// Straight lines between the middles of blocks of so many rows.
+    fn draw(&mut self, block: usize) {
         let blocks = &self.blocks;
         self.rows.clear();
-        for number in 0..blocks.len() * BLOCK {
-            let place = (single(number) + 0.5) / single(BLOCK) - 0.5;
+        for number in 0..blocks.len() * block {
+            let place = (single(number) + 0.5) / single(block) - 0.5;
             let place = place.clamp(0.0, single(blocks.len() - 1));
             let before = whole(place.floor()).min(blocks.len() - 1);
             let after = (before + 1).min(blocks.len() - 1);
@@ -166,26 +164,29 @@ impl Route {
     }
 }
 
-/// Best score of the block before from which each place can be reached, and where that
-/// lies: so many pixels more than [`MAX_ASIDE`] before the place.
+/// Best score of the block before from which each place can be reached.
 #[inline(always)]
-fn best_before(
-    scores: &Row,
-    inside: &std::ops::Range<usize>,
-    best: &mut Row,
-    froms: &mut [u8; SPAN],
-) {
+fn best_before(scores: &Row, inside: &std::ops::Range<usize>, best: &mut Row) {
     let mut padded = [f32::NEG_INFINITY; SPAN + 2 * MAX_ASIDE];
     padded[MAX_ASIDE..][inside.clone()].copy_from_slice(&scores[inside.clone()]);
     best.fill(f32::NEG_INFINITY);
-    froms.fill(MIDDLE);
-    for (from, aside) in (0..=2 * MIDDLE).zip(0..) {
-        let cost = ASIDE_COST * f32::from(from.abs_diff(MIDDLE));
-        for ((best, at), score) in best.iter_mut().zip(froms.iter_mut()).zip(&padded[aside..]) {
+    for from in 0..=2 * MAX_ASIDE {
+        let cost = aside_cost(from, MAX_ASIDE);
+        for (best, score) in best.iter_mut().zip(&padded[from..]) {
             let score = score - cost;
-            let is_better = score > *best;
-            *best = if is_better { score } else { *best };
-            *at = if is_better { from } else { *at };
+            *best = if score > *best { score } else { *best };
         }
     }
+}
+
+/// Place in the block before from which the course comes to a place.
+fn came_from(scores: &Row, inside: &std::ops::Range<usize>, at: usize) -> usize {
+    let near = at.saturating_sub(MAX_ASIDE).max(inside.start)..(at + MAX_ASIDE + 1).min(inside.end);
+    let score = |from: usize| scores[from] - aside_cost(from, at);
+    // Of equal scores the first.
+    near.rev().max_by(|&a, &b| score(a).total_cmp(&score(b))).unwrap_or(at)
+}
+
+fn aside_cost(from: usize, to: usize) -> f32 {
+    ASIDE_COST * single(from.abs_diff(to))
 }

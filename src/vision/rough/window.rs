@@ -13,16 +13,23 @@ pub type Row = [f32; SPAN];
 /// Standard deviation of the smoothing across \[px\]: a third of a usual blur, so
 /// that it hardly widens the flank.
 const ACROSS_PX: f64 = 0.7;
-/// The same along the bead \[rows\]: what is shorter than that is texture, and the
+/// The same along the bead \[px\]: what is shorter than that is texture, and the
 /// mean over the rows keeps its place.
-const ALONG_ROWS: f64 = 2.5;
-/// Rows from which on two are taken together: there are plenty.
+pub const ALONG_PX: f64 = 2.5;
+/// Rows of the gauge in a block.
+pub const BLOCK_ROWS: usize = 4;
+/// Rows of the gauge over which the smoothing along the bead follows no changes: two
+/// standard deviations.
+const FINE_ROWS: usize = 5;
+/// Rows of a gauge from which on two are taken together: there are plenty.
 const MANY_ROWS: usize = 400;
 
 /// The rows of one edge.
 #[derive(Debug, Clone, Default)]
 pub struct Windows {
     sheet: Sheet,
+    /// Caliper line of each row.
+    lines: Vec<usize>,
     rows: Vec<Row>,
     across: Vec<Row>,
     bead_after: bool,
@@ -33,9 +40,14 @@ pub struct Windows {
 }
 
 impl Windows {
-    /// Standard deviation of the smoothing along the bead \[px\].
-    pub fn along_px(&self) -> f64 {
-        ALONG_ROWS * float(self.together)
+    /// Rows of a block along the bead.
+    pub fn block(&self) -> usize {
+        BLOCK_ROWS / self.together
+    }
+
+    /// Rows over which an edge's profile changes by what is too fine to be followed.
+    pub fn fine(&self) -> usize {
+        FINE_ROWS / self.together
     }
 
     /// Number of rows.
@@ -50,7 +62,7 @@ impl Windows {
 
     /// Caliper line of a row.
     pub fn line(&self, number: usize) -> usize {
-        self.sheet.windows()[number].line
+        self.lines[number]
     }
 
     /// Rows of the gauge that a row is the mean of.
@@ -85,14 +97,20 @@ impl Windows {
     /// Reads the rows along a line.
     #[inline(always)]
     pub fn read<T: Grey>(&mut self, scene: &Scene<'_, T>, line: &StepLine) {
-        if self.kernels[0].is_empty() {
-            self.kernels = [kernel(ACROSS_PX), kernel(ALONG_ROWS)];
-        }
         let strip = scene.strip;
         let middle = narrow(float(strip.along) - 1.0) / 2.0;
-        self.together = if strip.along > MANY_ROWS { 2 } else { 1 };
+        let together = if strip.along > MANY_ROWS { 2 } else { 1 };
+        if self.together != together {
+            self.together = together;
+            self.kernels = [kernel(ACROSS_PX), kernel(ALONG_PX / float(together))];
+        }
         let at = |v: f32| [line.at + line.slope * (v - middle), 0.0, 1.0];
-        self.sheet.read(strip, scene.lines, (0.3, self.together), at);
+        // Caliper lines of an odd number of rows would leave single ones over.
+        self.sheet.read(strip, &[(0, strip.along)], (0.3, self.together), at);
+        self.lines.clear();
+        self.lines.extend(self.sheet.windows().iter().map(|window| {
+            scene.lines.partition_point(|line| narrow(float(line.1)) <= window.middle + 0.5)
+        }));
         self.bead_after = scene.bead_after;
         self.width = narrow(float(strip.across));
         let sign = if scene.bright { 1.0 } else { -1.0 };
@@ -100,11 +118,12 @@ impl Windows {
         self.across.resize(count, [0.0; SPAN]);
         self.rows.resize(count, [0.0; SPAN]);
         for (number, row) in self.across.iter_mut().enumerate() {
-            let pixels = self.sheet.pixels(number);
-            let mut turned = [0.0; SPAN];
-            for (k, value) in turned.iter_mut().enumerate() {
-                let from = if scene.bead_after { k } else { SPAN - 1 - k };
-                *value = sign * pixels[from];
+            let mut turned = *self.sheet.pixels(number);
+            if !scene.bead_after {
+                turned.reverse();
+            }
+            for pixel in &mut turned {
+                *pixel *= sign;
             }
             smooth_row(&turned, &self.kernels[0], row);
         }

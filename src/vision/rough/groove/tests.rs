@@ -21,7 +21,8 @@ fn profile(slope: f64, groove_px: f64, groove_grey: f64) -> MeanProfile {
 
 fn fitted(mean: &MeanProfile) -> EdgeShape {
     let blur = Blur { px: BLUR_PX, variance: 0.01 };
-    fit(mean, &Known { variance: 0.25, blur, edge: EdgeKind::Auto, roughness: 0.0 }).unwrap()
+    let (table, edge) = (&StepTable::default(), EdgeKind::Auto);
+    fit(mean, &Known { table, variance: 0.25, blur, edge, roughness: 0.0, before: None }).unwrap()
 }
 
 #[test]
