@@ -77,7 +77,7 @@ impl LinePair {
     }
 
     /// Whether a groove certainly lies beside one of the two lines.
-    pub fn is_beside_groove(&self) -> bool {
+    pub fn has_groove(&self) -> bool {
         let mut sides = self.sides.iter().zip(self.strengths);
         sides.any(|(line, strength)| strength > (1.0 + CERTAIN_GROOVE) * line.step)
     }
@@ -318,13 +318,10 @@ fn strongest_lines(
     while out.len() < MAX_LINES {
         let strongest = best.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
         let Some((at, &step)) = strongest.filter(|(_, best)| **best > 0.0) else { return };
-        let of_slope = means.chunks(across).zip(slopes);
-        let slope = of_slope.filter(|(means, _)| sign * means[at] >= step).map(|(_, slope)| *slope);
-        out.push(StepLine {
-            at: single(at) - 0.5,
-            slope: slope.min_by(f32::total_cmp).unwrap_or(0.0),
-            step,
-        });
+        let mut by_slope = means.chunks(across).zip(slopes);
+        let strongest = by_slope.find(|(means, _)| sign * means[at] >= step);
+        let Some((_, &slope)) = strongest else { return };
+        out.push(StepLine { at: single(at) - 0.5, slope, step });
         let near = at.saturating_sub(reach)..(at + reach + 1).min(across);
         best[near].fill(0.0);
     }

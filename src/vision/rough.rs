@@ -208,11 +208,11 @@ impl RoughEdge {
         }
         let of_shape = |shape: EdgeShape| {
             if is_groove_likely {
-                let (weight, of_shape) = (weight_of(shape), shape.variance + of_waves);
+                let (weight, of_groove) = (weight_of(shape), shape.variance + of_waves);
                 let rest = 1.0 - weight;
                 // Both are of the same pixels and read them differently: a correlation of a half.
-                let common = weight * rest * (of_shape * of_crossing).sqrt();
-                return weight * weight * of_shape + rest * rest * of_crossing + common;
+                let common = weight * rest * (of_groove * of_crossing).sqrt();
+                return weight * weight * of_groove + rest * rest * of_crossing + common;
             }
             shape.variance.max(noise.of_mean) + (SHIFT_FRACTION * shift).powi(2)
         };

@@ -156,7 +156,7 @@ impl Work {
         view: &View,
         surface: &SurfaceMap,
     ) -> Option<Result<WidthMeasurement, Reject>> {
-        if lines.0.is_beside_groove() {
+        if lines.0.has_groove() {
             return None;
         }
         let found = self.measure_mean_profile(lines, strip, view, surface);
