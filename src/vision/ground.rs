@@ -223,7 +223,7 @@ pub fn rises<T: Grey>(strip: &Strip<'_, T>, side: &Side<'_>, noise: f64, contras
         darkest = darkest.min(grey);
         rise = rise.max(grey - darkest);
     }
-    rise > (RISE * contrast).max(RISE_SIGMAS * noise / float(side.rows().max(1)).sqrt())
+    rise > RISE * contrast + RISE_SIGMAS * noise / float(side.rows().max(1)).sqrt()
 }
 
 /// Takes the straight line through each column out of it.

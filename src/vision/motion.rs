@@ -10,6 +10,13 @@ const BOX_FRACTIONS: [f64; 8] = [0.0, 0.3, 0.5, 0.65, 0.78, 0.87, 0.93, 0.97];
 /// By how much a box must lower the sum of squared residuals, in variances of their
 /// noise: a parameter that is not there lowers it by 16 once in 15,000 frames.
 const CLEARLY_BETTER: f64 = 16.0;
+/// The same beyond that of noise, and the blur \[px\], up to which the lens's blur fits well
+/// enough for other shapes to go on from: up to the box that is there each then fits better
+/// than the one before, and the shortest lowers the sum by a third and more of what the best
+/// does.
+const NEAR: f64 = 250.0;
+const NARROW_PX: f64 = 2.5;
+const PROMISING: f64 = 5.0;
 
 /// Tables of blurred steps: without a box and with longer and longer ones.
 #[derive(Debug, Clone)]
@@ -47,12 +54,12 @@ impl BlurShapes {
     }
 
     /// Chooses the shape that leaves least of both edges. `looks` are those with a
-    /// lens's blur, `again` looks with another shape at both. Returns the looks with the
-    /// shape that was chosen, where it is another one.
+    /// lens's blur, `again` looks with another shape at both, from such looks on or from
+    /// nothing. Returns the looks with the shape that was chosen, where it is another one.
     pub fn choose(
         &mut self,
         looks: [&Look; 2],
-        again: impl Fn(&StepTable) -> [Option<Look>; 2],
+        again: impl Fn(&StepTable, Option<[&Look; 2]>) -> [Option<Look>; 2],
     ) -> Option<[Look; 2]> {
         self.chosen = 0;
         // Where the lens's blur fits so well, no other can be clearly better.
@@ -60,10 +67,14 @@ impl BlurShapes {
         if excess < CLEARLY_BETTER {
             return None;
         }
-        let mut best = None;
-        let mut gain = CLEARLY_BETTER;
+        let is_narrow = looks.iter().all(|look| look.step.blur < NARROW_PX);
+        let is_near = is_narrow && excess < NEAR;
+        let mut best: Option<(usize, [Look; 2])> = None;
+        let mut gain = if is_near { PROMISING } else { CLEARLY_BETTER };
         for (number, table) in self.tables.iter().enumerate().skip(1) {
-            let [Some(left), Some(right)] = again(table) else { continue };
+            let before = best.as_ref().map_or(looks, |(_, [left, right])| [left, right]);
+            let found = again(table, is_near.then_some(before));
+            let [Some(left), Some(right)] = found else { continue };
             let fits = looks.iter().zip([&left, &right]);
             let gained =
                 fits.map(|(lens, other)| lens.samples() * (lens.misfit() - other.misfit()));
@@ -71,9 +82,11 @@ impl BlurShapes {
             if gained > gain {
                 gain = gained;
                 best = Some((number, [left, right]));
+            } else if is_near {
+                break;
             }
         }
-        best.map(|(number, looks)| {
+        best.filter(|_| gain > CLEARLY_BETTER).map(|(number, looks)| {
             self.chosen = number;
             looks
         })

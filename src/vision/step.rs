@@ -2,6 +2,8 @@
 //! Gaussian, as by a lens, and by a box, as by even motion while the shutter is open.
 //! Position is in standard deviations of the whole blur.
 
+use super::number::float;
+
 /// Half the table's reach, in standard deviations of the blur.
 const REACH: f64 = 6.0;
 /// Entries for each standard deviation.
@@ -83,7 +85,7 @@ impl StepTable {
         let (Some(low), Some(high)) = (self.entries.get(index), self.entries.get(index + 1)) else {
             return Entry { share: 1.0, density: 0.0, tail: 0.0 };
         };
-        let part = place.fract();
+        let part = place - float(index);
         let between = |low: f64, high: f64| low + part * (high - low);
         Entry {
             share: between(low.share, high.share),

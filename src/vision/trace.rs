@@ -277,10 +277,18 @@ impl Tracer {
         self.seen.as_ref()
     }
 
-    /// Looks at the same rows once more, with another shape of the blur. What is known
-    /// of a texture stays.
+    /// Looks at the same rows once more, with another shape of the blur, from a look at
+    /// them on or from nothing. What is known of a texture stays.
     #[inline(always)]
-    pub fn look_again<T: Grey>(&self, table: &StepTable, scene: &Scene<'_, T>) -> Option<Look> {
+    pub fn look_again<T: Grey>(
+        &self,
+        table: &StepTable,
+        scene: &Scene<'_, T>,
+        before: Option<&Look>,
+    ) -> Option<Look> {
+        if let Some(before) = before {
+            return self.overlay.fit_again(table, before);
+        }
         let seen = self.seen?;
         self.overlay.look(table, seen.pixel_noise(), self.room(scene))
     }

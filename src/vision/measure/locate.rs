@@ -8,6 +8,7 @@ use crate::vision::covered;
 use crate::vision::motion::BlurShapes;
 use crate::vision::noise;
 use crate::vision::number::narrow;
+use crate::vision::overlay::Look;
 use crate::vision::rank;
 use crate::vision::reject::Reject;
 use crate::vision::saturated;
@@ -110,8 +111,9 @@ fn choose_blur<T: Grey>(
     [left, right]: [&mut Tracer; 2],
     scenes: &[Scene<'_, T>; 2],
 ) -> Option<[Option<(f64, f64)>; 2]> {
-    let again = |table: &StepTable| {
-        [left.look_again(table, &scenes[0]), right.look_again(table, &scenes[1])]
+    let again = |table: &StepTable, before: Option<[&Look; 2]>| {
+        [(&left, 0), (&right, 1)]
+            .map(|(edge, k)| edge.look_again(table, &scenes[k], before.map(|looks| looks[k])))
     };
     let looks = shapes.choose([left.seen()?, right.seen()?], again)?;
     left.take_look(looks[0]);

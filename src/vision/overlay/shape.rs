@@ -233,6 +233,14 @@ impl Overlay {
         Some(look)
     }
 
+    /// Fits the edge of a look with another shape of the blur.
+    pub fn fit_again(&self, table: &StepTable, look: &Look) -> Option<Look> {
+        if look.flanks.any() {
+            return self.fit_flanks(table, look, None);
+        }
+        self.fit(table, *look, None)
+    }
+
     /// How far the surroundings on one side of a known step are plain \[px\],
     /// after it or before it, their slope in shares of the step that was given
     /// \[1/px away from it\], and the variance that its doubt leaves to the
