@@ -92,9 +92,14 @@ pub struct Coarse {
     across: usize,
     totals: Vec<f32>,
     strongest: Vec<f32>,
+    /// Sum of the steps of two bands.
+    pair: Vec<f32>,
     /// Mean step of every line: positions by slopes.
     means: Vec<f32>,
     slopes: Vec<f32>,
+    /// Highest and lowest of them at each position.
+    highest: Vec<f32>,
+    lowest: Vec<f32>,
     ups: Vec<StepLine>,
     downs: Vec<StepLine>,
 }
@@ -107,10 +112,7 @@ impl Coarse {
         self.respond(strip, reach);
         self.cap();
         self.project(strip.along);
-        self.ups.clear();
-        self.downs.clear();
-        strongest_lines(&self.means, &self.slopes, self.across, reach, 1.0, &mut self.ups);
-        strongest_lines(&self.means, &self.slopes, self.across, reach, -1.0, &mut self.downs);
+        self.find_strongest(reach);
     }
 
     /// Pairs of lines at a distance within a range, the strongest first.
@@ -260,29 +262,95 @@ impl Coarse {
         }
     }
 
-    /// Means of the steps along lines.
+    /// The strongest lines of either sign, each at least `reach` from the others.
+    #[inline(always)]
+    fn find_strongest(&mut self, reach: usize) {
+        // The highest and the lowest step of every position, of all slopes.
+        let (highest, lowest) = (&mut self.highest, &mut self.lowest);
+        for best in [&mut *highest, lowest] {
+            best.clear();
+            best.resize(self.across, 0.0);
+        }
+        for means in self.means.chunks(self.across) {
+            for ((high, low), &mean) in highest.iter_mut().zip(lowest.iter_mut()).zip(means) {
+                *high = if mean > *high { mean } else { *high };
+                *low = if mean < *low { mean } else { *low };
+            }
+        }
+        for low in lowest.iter_mut() {
+            *low = -*low;
+        }
+        let lines = Lines { means: &self.means, slopes: &self.slopes, reach };
+        lines.take(highest, 1.0, &mut self.ups);
+        lines.take(lowest, -1.0, &mut self.downs);
+    }
+
+    /// Means of the steps along lines. Of two neighbouring bands the steps are added for
+    /// each shift of one against the other before they are added along all lines.
     #[inline(always)]
     fn project(&mut self, along: usize) {
+        let across = self.across;
         let most = (MAX_SLOPE * single(along) / SLOPE_STEP_PX).ceil();
         let count = 2 * whole(most) + 1;
         self.slopes.clear();
         self.slopes.extend((0..count).map(|k| (single(k) - most) * SLOPE_STEP_PX / single(along)));
         self.means.clear();
-        self.means.resize(count * self.across, 0.0);
+        self.means.resize(count * across, 0.0);
+        self.pair.resize(across, 0.0);
         let scale = 1.0 / single(self.middles.len());
-        for (slope, means) in self.slopes.iter().zip(self.means.chunks_mut(self.across)) {
-            for (steps, middle) in self.steps.chunks(self.across).zip(&self.middles) {
-                let aside = shift(slope * middle);
-                let most = self.across.saturating_sub(aside.unsigned_abs());
-                let (into, from) = if aside >= 0 {
-                    (&mut means[..most], &steps[self.across - most..])
-                } else {
-                    (&mut means[self.across - most..], &steps[..most])
-                };
-                for (mean, step) in into.iter_mut().zip(from) {
-                    *mean += scale * step;
+        for (bands, middles) in self.steps.chunks(2 * across).zip(self.middles.chunks(2)) {
+            let (first, second) = bands.split_at(across);
+            let mut added = None;
+            for (slope, means) in self.slopes.iter().zip(self.means.chunks_mut(across)) {
+                let aside = shift(slope * middles[0]);
+                let apart = middles.get(1).map_or(0, |middle| shift(slope * middle) - aside);
+                if added != Some(apart) {
+                    self.pair.copy_from_slice(first);
+                    add_shifted(&mut self.pair, second, apart, 1.0);
+                    added = Some(apart);
                 }
+                add_shifted(means, &self.pair, aside, scale);
             }
+        }
+    }
+}
+
+/// Adds values, shifted to lower places by so many, times a scale.
+#[inline(always)]
+fn add_shifted(sums: &mut [f32], values: &[f32], aside: isize, scale: f32) {
+    let most = sums.len().min(values.len()).saturating_sub(aside.unsigned_abs());
+    let (sums, values) = if aside >= 0 {
+        (&mut sums[..most], &values[values.len() - most..])
+    } else {
+        let beyond = sums.len() - most;
+        (&mut sums[beyond..], &values[..most])
+    };
+    for (sum, value) in sums.iter_mut().zip(values) {
+        *sum += scale * value;
+    }
+}
+
+/// Mean steps of all lines, and the least distance of two that are taken \[px\].
+struct Lines<'a> {
+    means: &'a [f32],
+    slopes: &'a [f32],
+    reach: usize,
+}
+
+impl Lines<'_> {
+    /// Takes the strongest lines of a sign out of the strongest step of each position.
+    fn take(&self, best: &mut [f32], sign: f32, out: &mut Vec<StepLine>) {
+        out.clear();
+        let across = best.len();
+        while out.len() < MAX_LINES {
+            let strongest = best.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+            let Some((at, &step)) = strongest.filter(|(_, best)| **best > 0.0) else { return };
+            let mut by_slope = self.means.chunks(across).zip(self.slopes);
+            let strongest = by_slope.find(|(means, _)| sign * means[at] >= step);
+            let Some((_, &slope)) = strongest else { return };
+            out.push(StepLine { at: single(at) - 0.5, slope, step });
+            let near = at.saturating_sub(self.reach)..(at + self.reach + 1).min(across);
+            best[near].fill(0.0);
         }
     }
 }
@@ -296,35 +364,6 @@ fn groove(edge: &StepLine, far_sides: Option<&Vec<StepLine>>, outwards: f32) -> 
         if within { FAR_SIDE * far.step * (-gap / GROOVE_FALL_PX).exp() } else { 0.0 }
     });
     added.fold(0.0, f32::max)
-}
-
-/// The strongest lines of a sign, each at least `reach` from the others.
-#[inline(always)]
-fn strongest_lines(
-    means: &[f32],
-    slopes: &[f32],
-    across: usize,
-    reach: usize,
-    sign: f32,
-    out: &mut Vec<StepLine>,
-) {
-    // The strongest step of every position, of all slopes.
-    let mut best = vec![0.0; across];
-    for means in means.chunks(across) {
-        for (best, mean) in best.iter_mut().zip(means) {
-            *best = if sign * mean > *best { sign * mean } else { *best };
-        }
-    }
-    while out.len() < MAX_LINES {
-        let strongest = best.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
-        let Some((at, &step)) = strongest.filter(|(_, best)| **best > 0.0) else { return };
-        let mut by_slope = means.chunks(across).zip(slopes);
-        let strongest = by_slope.find(|(means, _)| sign * means[at] >= step);
-        let Some((_, &slope)) = strongest else { return };
-        out.push(StepLine { at: single(at) - 0.5, slope, step });
-        let near = at.saturating_sub(reach)..(at + reach + 1).min(across);
-        best[near].fill(0.0);
-    }
 }
 
 /// A shift by whole pixels.

@@ -15,6 +15,7 @@ use super::coarse::StepLine;
 use super::number::{float, floor, narrow, whole};
 use super::rank;
 use super::rough::RoughFit;
+use super::sheet::PLENTY;
 use super::step::StepTable;
 use super::strip::{Grey, Strip};
 use super::trace::Located;
@@ -197,8 +198,10 @@ impl MeanEdge {
         self.columns.clear();
         self.columns.resize(count, Column::default());
         let last = scene.strip.across - 1;
-        for row in 0..rows {
-            let place = float(row) - 0.5 * float(rows - 1);
+        let every = if rows > PLENTY { 2 } else { 1 };
+        let seen = rows.div_ceil(every);
+        for (number, row) in (0..rows).step_by(every).enumerate() {
+            let place = float(number) - 0.5 * float(seen - 1);
             let at = self.course.at(scene.place(row)) - scene.inwards() * float(HALF_PX);
             let nearest = whole(narrow(at)).min(last);
             let pixels = scene.strip.row(row);
@@ -212,7 +215,7 @@ impl MeanEdge {
             }
         }
         self.spreads.clear();
-        self.spreads.extend(self.columns.iter().map(|of| narrow(of.variance_about_line(rows))));
+        self.spreads.extend(self.columns.iter().map(|of| narrow(of.variance_about_line(seen))));
         let variance = rank::median(&mut self.spreads)?;
         Some(f64::from(scene.strip.scale * variance.sqrt()))
     }

@@ -30,7 +30,7 @@ pub use groove::Blur;
 use groove::EdgeShape;
 use levels::{Crossings, Levels, OUTSIDE};
 use route::Route;
-use window::{ALONG_PX, Windows};
+use window::{ALONG_PX, STRAIGHT_ROWS, Windows};
 
 /// Rounds in which levels are read along the edge that was found with the levels
 /// before.
@@ -151,7 +151,8 @@ impl RoughEdge {
         self.route.find(&self.windows, scene.width_px)?;
         for round in 1..=ROUNDS {
             self.levels.read(&self.windows, self.route.rows(), scene)?;
-            self.levels.cross(&self.windows, self.route.rows(), &mut self.crossings);
+            let every = if round == ROUNDS { 1 } else { STRAIGHT_ROWS };
+            self.levels.cross(&self.windows, self.route.rows(), every, &mut self.crossings);
             if round == ROUNDS {
                 self.levels.describe(&self.windows, self.route.rows(), &mut self.crossings);
             }

@@ -262,8 +262,10 @@ pub fn fit(mean: &MeanProfile, known: &Known<'_>) -> Option<EdgeShape> {
         let step = Model { width: WIDTH_PX.1, grey: narrow.beyond, ..narrow };
         let sigmas =
             [sigmas[0], APART_PX2, sigmas[2], sigmas[3], bead, sigmas[5], APART_PX2, sigmas[7]];
-        let step = Problem { prior: step, sigmas, ..groove }.descend(step)?;
-        let dip = groove.descend(narrow).filter(|dip| dip.model.is_dip());
+        let problem = Problem { prior: step, sigmas, ..groove };
+        let step = problem.descend(problem.solve(&step)?)?;
+        let dip = groove.solve(&narrow).and_then(|start| groove.descend(start));
+        let dip = dip.filter(|dip| dip.model.is_dip());
         let step_shape = groove.judge(&step, 0.0);
         let Some(dip) = dip else { return step_shape };
         let share = match known.edge {
@@ -283,9 +285,9 @@ pub fn fit(mean: &MeanProfile, known: &Known<'_>) -> Option<EdgeShape> {
         Some(shape) => [Some(shape.model), None],
         None => [Some(narrow), Some(wide(mean, narrow, last))],
     };
-    let fitted = starts.into_iter().flatten().filter_map(|start| groove.descend(start));
-    let best = fitted.min_by(|one, other| one.cost.total_cmp(&other.cost))?;
-    groove.judge(&best, 1.0)
+    let solved = starts.into_iter().flatten().filter_map(|start| groove.solve(&start));
+    let nearest = solved.min_by(|one, other| one.cost.total_cmp(&other.cost))?;
+    groove.judge(&groove.descend(nearest)?, 1.0)
 }
 
 /// The same groove as wide as the grey that is missing up to a place.
@@ -336,8 +338,8 @@ impl Problem<'_> {
 
     /// The least squares from a start on: Gauss–Newton, with steps that are halved until
     /// they descend.
-    fn descend(&self, start: Model) -> Option<Fitted> {
-        let mut best = self.solve(&start)?;
+    fn descend(&self, start: Fitted) -> Option<Fitted> {
+        let mut best = start;
         let mut share = 1.0;
         for _ in 0..ROUNDS {
             let step = share * best.solved.unknowns;

@@ -5,7 +5,7 @@ use super::Scene;
 use super::crossing::{self, Crossing, Flank};
 use super::kernel;
 use super::whole;
-use super::window::{BLOCK_ROWS, Windows};
+use super::window::{BLOCK_ROWS, STRAIGHT_ROWS, Windows};
 use crate::vision::gauge::EdgeKind;
 use crate::vision::number::{float, single};
 use crate::vision::rank;
@@ -84,12 +84,12 @@ pub struct Levels {
     kernels: [Vec<f32>; 2],
 }
 
-/// What the rows show of an edge, one value a row.
+/// What the rows show of an edge.
 #[derive(Debug, Clone, Default)]
 pub struct Crossings {
-    /// Position in the row's window \[px\]; not a number where there is none.
+    /// Position in each row's window \[px\]; not a number where there is none.
     pub at: Vec<f32>,
-    /// Length of the flank \[px\], likewise.
+    /// Length of the flank of every [`STRAIGHT_ROWS`]th row \[px\], likewise.
     pub flank: Vec<f32>,
     /// Distance of the edge from where what lies outside ends, likewise.
     pub gap: Vec<f32>,
@@ -208,9 +208,11 @@ impl Levels {
         }
         let [inside, outside] = &self.kernels;
         self.beside.clear();
-        let bead = bead_levels(&self.blocks, &mean);
-        let bead = smooth_levels(&bead, inside);
-        self.beside.extend(bead.map(|inside| BlockLevels { inside, ..BlockLevels::default() }));
+        let bead = smooth_levels(&bead_levels(&self.blocks, &mean), inside);
+        self.beside.resize(bead.len(), BlockLevels::default());
+        for (levels, inside) in self.beside.iter_mut().zip(bead) {
+            levels.inside = inside;
+        }
         smooth(&self.blocks, outside, &mut self.smooth);
         for (levels, profile) in self.beside.iter_mut().zip(&self.smooth) {
             levels.read_outside(profile, &mean);
@@ -246,16 +248,19 @@ impl Levels {
         }
     }
 
-    /// Where each row passes from outside to the bead; not a number where it does not.
+    /// Where every so many rows pass from outside to the bead; not a number where they do
+    /// not, and between them.
     #[inline(always)]
-    pub fn cross(&self, windows: &Windows, course: &[f32], out: &mut Crossings) {
+    pub fn cross(&self, windows: &Windows, course: &[f32], every: usize, out: &mut Crossings) {
+        let rows = windows.all();
         out.found.clear();
+        out.found.resize(rows.len(), None);
         out.at.clear();
-        // A closure would not be compiled for the processor's vectors.
-        for (row, (pixels, &at)) in windows.all().iter().zip(course).enumerate() {
-            let found = crossing::of(pixels, &self.flank(row, at));
-            out.found.push(found);
-            out.at.push(found.map_or(f32::NAN, |found| found.at));
+        out.at.resize(rows.len(), f32::NAN);
+        for row in (0..rows.len()).step_by(every) {
+            let found = crossing::of(&rows[row], &self.flank(row, course[row]));
+            out.found[row] = found;
+            out.at[row] = found.map_or(f32::NAN, |found| found.at);
         }
     }
 
@@ -263,19 +268,23 @@ impl Levels {
     #[inline(always)]
     pub fn describe(&self, windows: &Windows, course: &[f32], out: &mut Crossings) {
         let Crossings { at: _, flank, gap, odd, odd_within, off_course, found } = out;
+        let looks = found.len().div_ceil(STRAIGHT_ROWS);
         for values in [&mut *flank, gap, odd, odd_within] {
             values.clear();
-            values.resize(found.len(), f32::NAN);
+            values.resize(looks, f32::NAN);
+        }
+        for (look, row) in (0..found.len()).step_by(STRAIGHT_ROWS).enumerate() {
+            let Some(found) = found[row] else { continue };
+            let levels = self.flank(row, course[row]);
+            let shown = crossing::shown(&windows.all()[row], &levels, found);
+            flank[look] = shown.flank;
+            gap[look] = found.at - levels.start;
+            odd[look] = shown.odd;
+            odd_within[look] = shown.odd_within;
         }
         let (mut sum, mut seen) = (0.0, 0.0);
-        for (row, (found, &at)) in found.iter().zip(course).enumerate() {
-            let Some(found) = *found else { continue };
-            let levels = self.flank(row, at);
-            let shown = crossing::shown(&windows.all()[row], &levels, found);
-            flank[row] = shown.flank;
-            gap[row] = found.at - levels.start;
-            odd[row] = shown.odd;
-            odd_within[row] = shown.odd_within;
+        for (found, at) in found.iter().zip(course) {
+            let Some(found) = found else { continue };
             sum += f64::from(found.at - at.max(0.0).round());
             seen += 1.0;
         }
@@ -326,8 +335,11 @@ fn mean_profile(blocks: &[Profile], width_px: f32) -> Option<MeanProfile> {
     let mut grey = [0.0; LENGTH];
     for profile in blocks {
         for k in 0..LENGTH {
-            grey[k] += profile[k] / single(blocks.len());
+            grey[k] += profile[k];
         }
+    }
+    for value in &mut grey {
+        *value /= single(blocks.len());
     }
     let from = whole((INSIDE_FRACTION.0 * width_px).clamp(2.0, INSIDE.0));
     let to = whole((INSIDE_FRACTION.1 * width_px).min(INSIDE.1)).max(from + 1);
@@ -423,11 +435,12 @@ struct BeadLevel {
 }
 
 /// Levels of the bead itself: places that show a hole in it are passed over. Every fourth
-/// place tells what a hole is.
+/// place of every second block tells what a hole is.
+#[inline(always)]
 fn bead_levels(blocks: &[Profile], mean: &MeanProfile) -> Vec<BeadLevel> {
     let (from, to) = mean.inside;
-    let mut values = Vec::with_capacity(blocks.len() * (to - from).div_ceil(4));
-    for profile in blocks {
+    let mut values = Vec::with_capacity(blocks.len() * (to - from).div_ceil(8));
+    for profile in blocks.iter().step_by(2) {
         values.extend(profile[from..to].chunks(4).map(|places| places[0]));
     }
     let median = rank::median(&mut values).unwrap_or(0.0);
@@ -437,29 +450,30 @@ fn bead_levels(blocks: &[Profile], mean: &MeanProfile) -> Vec<BeadLevel> {
     let spread = rank::median(&mut values).unwrap_or(0.0);
     let contrast = median - mean.grey[darkest_of(&mean.grey, 0)];
     let limit = median - (HOLE_SPREADS * spread).max(HOLE * contrast);
-    let of_block = |profile: &Profile| {
+    let mut levels = Vec::with_capacity(blocks.len());
+    for profile in blocks {
         let (mut sum, mut places) = (0.0, 0.0);
-        for value in profile[from..to].iter().filter(|value| **value > limit) {
-            sum += value;
-            places += 1.0;
+        for &value in &profile[from..to] {
+            let seen = if value > limit { 1.0 } else { 0.0 };
+            sum += seen * value;
+            places += seen;
         }
-        BeadLevel { grey: if places > 0.0 { sum / places } else { median }, places }
-    };
-    blocks.iter().map(of_block).collect()
+        levels.push(BeadLevel { grey: if places > 0.0 { sum / places } else { median }, places });
+    }
+    levels
 }
 
 /// The bead's level about each block, by a kernel over the blocks on either side.
 #[inline(always)]
-fn smooth_levels(levels: &[BeadLevel], kernel: &[f32]) -> impl Iterator<Item = f32> {
+fn smooth_levels(levels: &[BeadLevel], kernel: &[f32]) -> Vec<f32> {
     let products: Vec<f32> = levels.iter().map(|level| level.places * level.grey).collect();
     let places: Vec<f32> = levels.iter().map(|level| level.places).collect();
-    let (sums, totals) = (smooth_values(&products, kernel), smooth_values(&places, kernel));
-    let own = levels.iter().map(|level| level.grey);
-    sums.into_iter().zip(totals).zip(own).map(
-        |((sum, total), own)| {
-            if total > 0.0 { sum / total } else { own }
-        },
-    )
+    let mut smooth = smooth_values(&products, kernel);
+    let totals = smooth_values(&places, kernel);
+    for ((sum, total), own) in smooth.iter_mut().zip(totals).zip(levels) {
+        *sum = if total > 0.0 { *sum / total } else { own.grey };
+    }
+    smooth
 }
 
 /// Sums of values about each, by a kernel.
@@ -500,8 +514,13 @@ fn smooth(blocks: &[Profile], kernel: &[f32], out: &mut Vec<[f32; AROUND]>) {
 
 /// Darkest place outside, from a place on.
 fn darkest_of(profile: &[f32], from: usize) -> usize {
-    let places = from..=OUTSIDE;
-    places.min_by(|&a, &b| profile[a].total_cmp(&profile[b])).unwrap_or(OUTSIDE)
+    let mut darkest = from.min(OUTSIDE);
+    for place in darkest + 1..=OUTSIDE {
+        if profile[place] < profile[darkest] {
+            darkest = place;
+        }
+    }
+    darkest
 }
 
 fn mean_of(profile: &[f32], (from, to): (usize, usize)) -> f32 {

@@ -16,6 +16,8 @@ const ACROSS_PX: f64 = 0.7;
 /// The same along the bead \[px\]: what is shorter than that is texture, and the
 /// mean over the rows keeps its place.
 pub const ALONG_PX: f64 = 2.5;
+/// Rows between which a course is straight: the smoothing along the bead leaves no more.
+pub const STRAIGHT_ROWS: usize = 2;
 /// Rows of the gauge in a block.
 pub const BLOCK_ROWS: usize = 4;
 /// Rows of the gauge over which the smoothing along the bead follows no changes: two
@@ -108,9 +110,14 @@ impl Windows {
         // Caliper lines of an odd number of rows would leave single ones over.
         self.sheet.read(strip, &[(0, strip.along)], (0.3, self.together), at);
         self.lines.clear();
-        self.lines.extend(self.sheet.windows().iter().map(|window| {
-            scene.lines.partition_point(|line| narrow(float(line.1)) <= window.middle + 0.5)
-        }));
+        let mut line = 0;
+        for window in self.sheet.windows() {
+            let is_beyond = |end: usize| narrow(float(end)) <= window.middle + 0.5;
+            while scene.lines.get(line).is_some_and(|line| is_beyond(line.1)) {
+                line += 1;
+            }
+            self.lines.push(line);
+        }
         self.bead_after = scene.bead_after;
         self.width = narrow(float(strip.across));
         let sign = if scene.bright { 1.0 } else { -1.0 };
@@ -118,29 +125,36 @@ impl Windows {
         self.across.resize(count, [0.0; SPAN]);
         self.rows.resize(count, [0.0; SPAN]);
         for (number, row) in self.across.iter_mut().enumerate() {
-            let mut turned = *self.sheet.pixels(number);
-            if !scene.bead_after {
-                turned.reverse();
-            }
-            for pixel in &mut turned {
-                *pixel *= sign;
-            }
-            smooth_row(&turned, &self.kernels[0], row);
+            smooth_row(self.sheet.pixels(number), (sign, scene.bead_after), &self.kernels[0], row);
         }
-        smooth_along(&self.across, &self.kernels[1], &mut self.rows);
+        let mut along = [0.0; LONGEST + 1];
+        for (weight, of_kernel) in along.iter_mut().zip(&self.kernels[1]) {
+            *weight = *of_kernel;
+        }
+        smooth_along(&self.across, &along, &mut self.rows);
     }
 }
 
-/// Convolves a row with a symmetric kernel; beyond the ends the last pixel goes on.
+/// Convolves a row, multiplied by a sign and in reverse where its bead lies before, with a
+/// symmetric kernel; beyond the ends the last pixel goes on.
 #[inline(always)]
-fn smooth_row(row: &Row, kernel: &[f32], out: &mut Row) {
+fn smooth_row(row: &Row, (sign, bead_after): (f32, bool), kernel: &[f32], out: &mut Row) {
     const PAD: usize = 4;
     let mut padded = [0.0; SPAN + 2 * PAD];
-    padded[..PAD].fill(row[0]);
-    padded[PAD..PAD + SPAN].copy_from_slice(row);
-    padded[PAD + SPAN..].fill(row[SPAN - 1]);
-    for (out, value) in out.iter_mut().zip(row) {
-        *out = kernel[0] * value;
+    if bead_after {
+        for k in 0..SPAN {
+            padded[PAD + k] = sign * row[k];
+        }
+    } else {
+        for k in 0..SPAN {
+            padded[PAD + k] = sign * row[SPAN - 1 - k];
+        }
+    }
+    let (first, last) = (padded[PAD], padded[PAD + SPAN - 1]);
+    padded[..PAD].fill(first);
+    padded[PAD + SPAN..].fill(last);
+    for k in 0..SPAN {
+        out[k] = kernel[0] * padded[PAD + k];
     }
     for (offset, weight) in kernel.iter().enumerate().skip(1).take(PAD) {
         for k in 0..SPAN {
@@ -149,10 +163,15 @@ fn smooth_row(row: &Row, kernel: &[f32], out: &mut Row) {
     }
 }
 
+/// Pixels that are convolved together: what the processor holds in its vectors.
+const TOGETHER: usize = 16;
+/// Samples of a kernel beside its middle at most.
+const LONGEST: usize = 8;
+
 /// Convolves along the bead. Beyond the ends the rows come again in reverse, so
 /// that each row weighs as much as any other in the mean of all.
 #[inline(always)]
-fn smooth_along(rows: &[Row], kernel: &[f32], out: &mut [Row]) {
+fn smooth_along(rows: &[Row], kernel: &[f32; LONGEST + 1], out: &mut [Row]) {
     let count = rows.len().cast_signed();
     let mirrored = |v: isize| {
         let v = if v < 0 { -1 - v } else { v };
@@ -160,15 +179,25 @@ fn smooth_along(rows: &[Row], kernel: &[f32], out: &mut [Row]) {
         v.clamp(0, count - 1).unsigned_abs()
     };
     for (number, out) in (0..).zip(out.iter_mut()) {
-        let row = &rows[mirrored(number)];
-        for k in 0..SPAN {
-            out[k] = kernel[0] * row[k];
+        let middle = &rows[mirrored(number)];
+        let mut near = [[middle; 2]; LONGEST];
+        for (offset, near) in (1..).zip(&mut near) {
+            *near = [&rows[mirrored(number - offset)], &rows[mirrored(number + offset)]];
         }
-        for (offset, &weight) in (0..).zip(kernel).skip(1) {
-            let (one, other) = (&rows[mirrored(number - offset)], &rows[mirrored(number + offset)]);
-            for k in 0..SPAN {
-                out[k] += weight * (one[k] + other[k]);
+        for (part, out) in out.as_chunks_mut::<TOGETHER>().0.iter_mut().enumerate() {
+            let pixels = &middle.as_chunks::<TOGETHER>().0[part];
+            let mut sums = [0.0; TOGETHER];
+            for k in 0..TOGETHER {
+                sums[k] = kernel[0] * pixels[k];
             }
+            for offset in 0..LONGEST {
+                let before = &near[offset][0].as_chunks::<TOGETHER>().0[part];
+                let after = &near[offset][1].as_chunks::<TOGETHER>().0[part];
+                for k in 0..TOGETHER {
+                    sums[k] += kernel[offset + 1] * (before[k] + after[k]);
+                }
+            }
+            *out = sums;
         }
     }
 }
