@@ -65,7 +65,7 @@ const GROOVE_CROSSING_PX: f64 = 0.5;
 /// Difference of the bead's level beside the edge from that farther inside, in standard
 /// deviations of what light does, from which on the former is taken, and the standard
 /// deviation of the shift that this makes, as a fraction of it.
-const LEVEL_OFF: f64 = 1.0;
+const LEVEL_OFF: f64 = 0.5;
 const SHIFT_FRACTION: f64 = 0.2;
 
 /// What is looked at.
