@@ -15,6 +15,7 @@ use crate::calib::SurfaceMap;
 use crate::frame::Frame;
 use crate::geometry::ImagePoint;
 use judge::{WIDEST_BLUR_PX, WIDEST_MOTION_PX};
+use patterned::STRONGEST_BESIDE_WHOLE;
 use rough::may_be_rough;
 
 use super::axis;
@@ -299,7 +300,8 @@ impl Work {
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
         let knows_texture = self.left.knows_texture() && self.right.knows_texture();
-        let is_on_texture = knows_texture && self.pattern_share > 0.0;
+        let is_bearable = self.pattern_share > 0.0 && self.pattern_share < STRONGEST_BESIDE_WHOLE;
+        let is_on_texture = knows_texture && is_bearable;
         if !is_on_texture && let Some(textured) = self.measure_textured(strip, range, view, surface)
         {
             return textured;

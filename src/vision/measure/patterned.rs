@@ -22,6 +22,9 @@ const STRONGEST: f64 = 0.37;
 /// plain bead is none of those.
 const STRONGEST_OF_SAME: f64 = 0.48;
 const STRONGEST_BESIDE_PLAIN: f64 = 0.2;
+/// The same where the blurred steps of a plain bead show all along it: beside drawn patterns
+/// of more, one in fifty was off by five standard deviations. A real strand has up to 0.2.
+pub(super) const STRONGEST_BESIDE_WHOLE: f64 = 0.25;
 /// Weakest pattern, as a fraction of the contrast, beside which blurred steps are not
 /// good enough: one of less draws them outwards by hardly 0.02 px.
 const NOTABLE: f64 = 0.06;
@@ -75,9 +78,8 @@ impl Work {
     }
 
     /// Measures a bead that was measured already, where it or the ground has a pattern.
-    /// `None` where neither has, or a weak one, or no lines are found, and where the mean
-    /// profile tells no edges and either the pattern is bearable or the blurred steps show
-    /// all along the bead.
+    /// `None` where neither has, or a weak one, and where the mean profile tells no edges and
+    /// the pattern is bearable beside blurred steps.
     #[inline(never)]
     pub(super) fn measure_textured<T: Grey>(
         &mut self,
@@ -90,7 +92,9 @@ impl Work {
         if !is_textured && self.pattern_share == 0.0 {
             return None;
         }
-        let pair = self.find_lines(strip, range).ok()?;
+        let Ok(pair) = self.find_lines(strip, range) else {
+            return self.check_whole(is_textured).err().map(Err);
+        };
         let pattern = self.ground_pattern(strip, &pair);
         let contrast = self.contrasts[0].min(self.contrasts[1]);
         if !is_textured && pattern < NOTABLE * contrast {
@@ -101,8 +105,19 @@ impl Work {
             return found;
         }
         let is_whole = self.left.used_share().min(self.right.used_share()) > WHOLE_SHARE;
-        let checked = check_pattern(pattern / contrast, is_textured);
-        checked.err().filter(|_| !is_whole).map(Err)
+        let checked = if is_whole {
+            self.check_whole(is_textured)
+        } else {
+            check_pattern(pattern / contrast, is_textured)
+        };
+        checked.err().map(Err)
+    }
+
+    /// Refuses blurred steps of a plain bead all along which they show, beside a strong
+    /// pattern on both sides.
+    fn check_whole(&self, is_textured: bool) -> Result<(), Reject> {
+        let (got, limit) = (self.pattern_share, STRONGEST_BESIDE_WHOLE);
+        if !is_textured && got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
     /// Whether the bead between two blurred steps has a texture, from that beside both.
@@ -191,7 +206,9 @@ impl Work {
         if !(ground + bead).is_finite() {
             return Err(failed);
         }
-        let fits = [one, other].map(|fit| fit.as_rough(blur_px, ground + bead));
+        // An edge beside a strong pattern is drawn to its bright places.
+        let variance = ground * (1.0 + (got / STRONGEST).powi(4)) + bead;
+        let fits = [one, other].map(|fit| fit.as_rough(blur_px, variance));
         even::check(&fits, even::middle_grey(strip, pair))?;
         self.left_px.clear();
         self.right_px.clear();

@@ -19,6 +19,14 @@ const CONVERGED: f64 = 8e-3;
 /// How far from the edge samples are fitted, in blurs and pixels beside.
 const FIT_BLURS: f64 = 4.5;
 const FIT_BESIDE_PX: f64 = 2.0;
+/// Slope that shows another step beside the edge, times the blur: a twelfth of what the
+/// edge itself has. The fraction of it that is enough where the edge alone leaves more than
+/// noise does, as beside a rib of a tenth of the contrast; the misfit from which on it does;
+/// and the fraction of that excess that is left at most where there is such a step.
+const NOTABLE: f64 = 0.032;
+const WEAK_SHARE: f64 = 0.5;
+const STRANGE: f64 = 1.3;
+const EXPLAINED: f64 = 0.5;
 /// Shading that is usual close to an edge, as a standard deviation \[1/px\].
 pub const SHADING_SD: f64 = 0.02;
 
@@ -213,7 +221,8 @@ impl Overlay {
         let (slope, at) = slopes.steepest(room)?;
         let blur = (0.2 / slope).clamp(0.5, MOST_BLUR_PX);
         let step = Step { at, blur, before: 0.0, after: 1.0 };
-        let (room, flanks) = self.up_to_neighbours(&slopes, step, noise, room);
+        let whole_room = room;
+        let (room, flanks) = self.up_to_neighbours(&slopes, step, (noise, NOTABLE), room);
         let look = Look {
             step,
             blur_sd: f64::INFINITY,
@@ -224,13 +233,22 @@ impl Overlay {
             flanks: Flanks::default(),
             doubt: 0.0,
         };
-        let mut look = self.fit(table, look, None)?;
+        let look = self.fit(table, look, None)?;
         let flanks = flanks.near(&look.step);
         if flanks.any() {
             let start = Look { flanks, ..look };
-            look = self.fit_flanks(table, &start, None).unwrap_or(look);
+            return Some(self.fit_flanks(table, &start, None).unwrap_or(look));
         }
-        Some(look)
+        if look.misfit() < STRANGE {
+            return Some(look);
+        }
+        // A weaker step beside it, if that explains what is left.
+        let weaker = (noise, WEAK_SHARE * NOTABLE);
+        let (_, flanks) = self.up_to_neighbours(&slopes, step, weaker, whole_room);
+        let start = Look { flanks: flanks.near(&look.step), ..look };
+        let found = start.flanks.any().then(|| self.fit_flanks(table, &start, None)).flatten();
+        let limit = 1.0 + EXPLAINED * (look.misfit() - 1.0);
+        Some(found.filter(|found| found.misfit() < limit).unwrap_or(look))
     }
 
     /// Fits the edge of a look with another shape of the blur.
@@ -297,12 +315,12 @@ impl Overlay {
         &self,
         slopes: &Slopes,
         start: Step,
-        noise: f64,
+        (noise, notable): (f64, f64),
         room: Extent,
     ) -> (Extent, Flanks) {
-        let noise = noise / (2.0 * self.used().max(1.0)).sqrt();
-        let (before, flank_before) = slopes.up_to_neighbour(start, noise, (-1, room.before));
-        let (after, flank_after) = slopes.up_to_neighbour(start, noise, (1, room.after));
+        let limits = (noise / (2.0 * self.used().max(1.0)).sqrt(), notable);
+        let (before, flank_before) = slopes.up_to_neighbour(start, limits, (-1, room.before));
+        let (after, flank_after) = slopes.up_to_neighbour(start, limits, (1, room.after));
         (Extent { before, after }, Flanks([flank_before, flank_after]))
     }
 

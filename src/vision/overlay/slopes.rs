@@ -5,10 +5,6 @@ use super::flank::Flank;
 use super::shape::{Extent, Step};
 use super::{Overlay, PHASES, REACH, SPAN};
 
-/// Slope that shows another step beside the edge, times the blur: a sixteenth of
-/// what the edge itself has. Of ribs that begin 6 px beside it and have a tenth of its
-/// contrast, a twelfth missed many.
-const NOTABLE: f64 = 0.024;
 /// Distance from the path within which the edge lies \[px\].
 const NEAR_PX: f64 = 8.0;
 
@@ -59,17 +55,17 @@ impl Slopes {
         (best.0 > 0.01).then_some((f64::from(best.0), f64::from(best.1) / 2.0))
     }
 
-    /// Room on one side up to half-way to a neighbouring step, and that step. The
-    /// noise is that of a slope.
+    /// Room on one side up to half-way to a neighbouring step, and that step. `noise` is
+    /// that of a slope, `notable` the slope that shows such a step, times the edge's blur.
     #[expect(clippy::cast_possible_truncation, reason = "a slope needs no more")]
     #[inline(always)]
     pub fn up_to_neighbour(
         &self,
         start: Step,
-        noise: f64,
+        (noise, notable): (f64, f64),
         (sign, room): (i16, f64),
     ) -> (f64, Option<Flank>) {
-        let notable = (5.0 * noise).max(NOTABLE / start.blur.max(1.0)) as f32;
+        let notable = (5.0 * noise).max(notable / start.blur.max(1.0)) as f32;
         let first = (0.5 * start.blur).clamp(0.5, 3.0);
         let mut lowest = (f32::INFINITY, room);
         let from = halves(start.at + f64::from(sign) * first);
