@@ -26,6 +26,7 @@ use super::number::{float, narrow, whole};
 use super::step::StepTable;
 use super::strip::{Grey, Strip};
 use super::trace::{self, Located};
+use crossing::INSIDE_PX;
 pub use groove::Blur;
 use groove::EdgeShape;
 use levels::{Crossings, Levels, OUTSIDE};
@@ -66,6 +67,9 @@ const GROOVE_CROSSING_PX: f64 = 0.5;
 /// deviations of what light does, from which on the former is taken, and the standard
 /// deviation of the shift that this makes, as a fraction of it.
 const LEVEL_OFF: f64 = 0.5;
+/// How far off the shape may lie then, in what such a difference makes of the pixels that are
+/// summed within the edge: a flank that is no blurred step lies farther.
+const MOST_OFF: f64 = 2.0;
 const SHIFT_FRACTION: f64 = 0.2;
 
 /// What is looked at.
@@ -189,7 +193,14 @@ impl RoughEdge {
         let is_groove_likely = shape.is_some_and(|shape| shape.groove_share > LIKELY_GROOVE);
         let noise = noise::of_mean(&self.windows, &self.levels, &self.crossings, scene)?;
         // Where a rib or a shade lies within, only the level beside the edge is the bead's.
-        let shaped = shape.filter(|shape| is_groove_likely || shape.level_off > LEVEL_OFF);
+        let off = |shape: &EdgeShape| shape.at - float(OUTSIDE) - self.crossings.off_course;
+        let contrast = self.levels.contrast();
+        let of_level = |shape: &EdgeShape| {
+            let level = shape.level_off * groove::BEAD_SIGMA * bead_grey / contrast;
+            shape.level_off > LEVEL_OFF
+                && off(shape).abs() < MOST_OFF * level * f64::from(INSIDE_PX)
+        };
+        let shaped = shape.filter(|shape| is_groove_likely || of_level(shape));
         let of_waves = if hides_depth {
             let waves = noise::roughness(&self.crossings).sqrt();
             (GROOVE_WAVES * waves).min(MOST_GROOVE_WAVES_PX).powi(2)
@@ -200,10 +211,7 @@ impl RoughEdge {
         let weight_of = |shape: EdgeShape| {
             if on_ground { 1.0 } else { of_crossing / (of_crossing + shape.variance + of_waves) }
         };
-        let shift_to = |shape: EdgeShape| {
-            weight_of(shape) * (shape.at - float(OUTSIDE) - self.crossings.off_course)
-        };
-        let shift = shaped.map_or(0.0, shift_to);
+        let shift = shaped.map_or(0.0, |shape| weight_of(shape) * off(&shape));
         for at in &mut self.crossings.at {
             *at += narrow(shift);
         }
@@ -222,7 +230,7 @@ impl RoughEdge {
         Some(RoughFit {
             variance: shaped.map_or(noise.of_mean, of_shape),
             rows_fraction: float(seen) / float(self.crossings.at.len()),
-            contrast: self.levels.contrast(),
+            contrast,
             blur_px: noise.blur_px,
             bead_grey,
             is_groove,

@@ -21,12 +21,11 @@ const FIT_BLURS: f64 = 4.5;
 const FIT_BESIDE_PX: f64 = 2.0;
 /// Slope that shows another step beside the edge, times the blur: a twelfth of what the
 /// edge itself has. The fraction of it that is enough where the edge alone leaves more than
-/// noise does, as beside a rib of a tenth of the contrast; the misfit from which on it does;
-/// and the fraction of that excess that is left at most where there is such a step.
+/// noise does and such a step explains it, as beside a rib of a tenth of the contrast; and
+/// the misfit from which on it is more than noise.
 const NOTABLE: f64 = 0.032;
 const WEAK_SHARE: f64 = 0.5;
 const STRANGE: f64 = 1.3;
-const EXPLAINED: f64 = 0.5;
 /// Shading that is usual close to an edge, as a standard deviation \[1/px\].
 pub const SHADING_SD: f64 = 0.02;
 
@@ -247,8 +246,7 @@ impl Overlay {
         let (_, flanks) = self.up_to_neighbours(&slopes, step, weaker, whole_room);
         let start = Look { flanks: flanks.near(&look.step), ..look };
         let found = start.flanks.any().then(|| self.fit_flanks(table, &start, None)).flatten();
-        let limit = 1.0 + EXPLAINED * (look.misfit() - 1.0);
-        Some(found.filter(|found| found.misfit() < limit).unwrap_or(look))
+        Some(found.filter(|found| found.misfit() < STRANGE).unwrap_or(look))
     }
 
     /// Fits the edge of a look with another shape of the blur.

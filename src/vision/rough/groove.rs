@@ -15,7 +15,7 @@ use nalgebra::SVector;
 const GREY: f64 = 0.13;
 const GREY_SIGMA: f64 = 0.12;
 /// The same of the bead beside the edge about its level farther inside: light.
-const BEAD_SIGMA: f64 = 0.03;
+pub(super) const BEAD_SIGMA: f64 = 0.03;
 /// Places beyond the groove, and within the bead, that are fitted \[px\].
 const BEYOND_PX: usize = 9;
 const WITHIN_PX: usize = 7;
