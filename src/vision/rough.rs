@@ -67,10 +67,10 @@ const GROOVE_CROSSING_PX: f64 = 0.5;
 /// deviations of what light does, from which on the former is taken, and the standard
 /// deviation of the shift that this makes, as a fraction of it.
 const LEVEL_OFF: f64 = 0.5;
+const SHIFT_FRACTION: f64 = 0.2;
 /// How far off the shape may lie then, in what such a difference makes of the pixels that are
 /// summed within the edge: a flank that is no blurred step lies farther.
 const MOST_OFF: f64 = 2.0;
-const SHIFT_FRACTION: f64 = 0.2;
 
 /// What is looked at.
 #[derive(Debug, Clone, Copy)]
