@@ -87,4 +87,4 @@ pub use gauge::{Axis, EdgeKind, Gauge, Method, Polarity};
 pub use measure::Measurer;
 pub use reject::Reject;
 pub use roughness::{LocalWidths, Roughness, RoughnessEstimator};
-pub use width::{Caliper, EdgePlace, Edges, Hints, WidthMeasurement};
+pub use width::{Caliper, EdgePlace, Edges, Hints, Skew, WidthMeasurement};

@@ -188,6 +188,7 @@ impl Bench<'_> {
                         let first = Refusal { frame: frame.seq, why: *why };
                         self.refusals.entry(why.status()).or_insert(first);
                     })
+                    .map(|found| measurer.with_skew(found))
                     .map_err(|reject| reject.status());
                 self.roughness.frame(measurer, outcome.as_ref().ok(), &surface);
                 let roughness = self.roughness.estimate();

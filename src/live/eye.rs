@@ -142,6 +142,7 @@ fn measure_frames(mailbox: &Mailbox<Taken>, optics: &Optics, tap: &FrameTap, tel
             Taken::Frame(frame, had_at) => {
                 let surface = optics.surface();
                 let outcome = measurer.measure(&frame, &surface);
+                let outcome = outcome.map(|found| measurer.with_skew(found));
                 estimator.frame(&measurer, outcome.as_ref().ok(), &surface);
                 let roughness = estimator.estimate();
                 let edges = measurer.edges();

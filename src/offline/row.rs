@@ -98,6 +98,7 @@ pub mod sample {
                 noise_grey: 2.0,
                 saturated_share: 0.01,
                 used_share: 0.98,
+                skew: None,
             },
         }
     }

@@ -42,6 +42,34 @@ impl Moments {
     }
 }
 
+/// Mean of numbers that are not equally sure, each weighed by 1/variance.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct WeightedMean {
+    sum: f64,
+    weight: f64,
+}
+
+impl WeightedMean {
+    /// Takes a number of a variance; one without weight is left out.
+    pub fn add(&mut self, value: f64, variance: f64) {
+        let weight = 1.0 / variance;
+        if value.is_finite() && weight.is_finite() && weight > 0.0 {
+            self.sum += weight * value;
+            self.weight += weight;
+        }
+    }
+
+    /// The mean; none of none.
+    pub fn mean(&self) -> Option<f64> {
+        (self.weight > 0.0).then(|| self.sum / self.weight)
+    }
+
+    /// Its standard deviation.
+    pub fn sigma(&self) -> Option<f64> {
+        (self.weight > 0.0).then(|| self.weight.sqrt().recip())
+    }
+}
+
 /// Buckets for every doubling: a quantile is off by at most 0.14 %.
 const PER_OCTAVE: usize = 256;
 /// Exponents of two that are told apart; what is smaller counts as the

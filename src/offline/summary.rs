@@ -23,7 +23,7 @@ pub use profile::ProfileSummary;
 use super::output::{LogError, write_whole};
 use super::row::FrameRow;
 use super::setup;
-use super::stats::{Distribution, Moments, as_f64};
+use super::stats::{Distribution, Moments, WeightedMean, as_f64};
 use crate::control::{Event, Step};
 use crate::time::{Span, Stamp};
 use crate::units::{Mm, Mm3PerS};
@@ -86,6 +86,11 @@ pub struct HintSummary {
     pub saturated_share_mean: Option<f64>,
     /// Mean share of caliper lines in use.
     pub used_share_mean: Option<f64>,
+    /// How far the skew of the edges' flanks moves widths: measured less true width in the
+    /// picture, the mean weighed by what each frame tells \[px\].
+    pub skew_offset_px: Option<f64>,
+    /// Its standard deviation \[px\].
+    pub skew_offset_sigma_px: Option<f64>,
 }
 
 /// Roughness of the bead, which no standard deviation of a width contains.
@@ -176,6 +181,7 @@ pub struct SummaryBuilder {
     contrast: Distribution,
     blur: Distribution,
     noise: Distribution,
+    skew: WeightedMean,
     first_s: Option<f64>,
     last_s: Option<f64>,
     control: Option<ControlTally>,
@@ -199,6 +205,7 @@ impl SummaryBuilder {
             contrast: Distribution::default(),
             blur: Distribution::default(),
             noise: Distribution::default(),
+            skew: WeightedMean::default(),
             first_s: None,
             last_s: None,
             control: with_control.then(ControlTally::default),
@@ -234,6 +241,9 @@ impl SummaryBuilder {
                 self.contrast.add(measured.hints.contrast_grey);
                 self.blur.add(measured.hints.blur_px);
                 self.noise.add(measured.hints.noise_grey);
+                if let Some(skew) = measured.hints.skew {
+                    self.skew.add(skew.offset_px, skew.variance);
+                }
             }
         }
         if let Some(control) = &mut self.control {
@@ -306,6 +316,8 @@ impl SummaryBuilder {
             noise_median_grey: self.noise.quantile(0.5),
             saturated_share_mean: self.saturated.mean(),
             used_share_mean: self.used.mean(),
+            skew_offset_px: self.skew.mean(),
+            skew_offset_sigma_px: self.skew.sigma(),
         }
     }
 

@@ -21,13 +21,6 @@ const TOLD: f64 = 0.25;
 /// there is no need of medians.
 const SURELY_NOISE: f64 = 1.1;
 
-/// Places beside the edge within which a narrow groove lies \[px\].
-const GROOVE_PX: usize = 9;
-/// By how much what lies beyond a groove is brighter at least: a fraction of the
-/// contrast, and standard deviations of noise.
-const RISE: f64 = 0.015;
-const RISE_SIGMAS: f64 = 5.0;
-
 /// Where an edge lies on some rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
@@ -51,39 +44,9 @@ pub struct Side<'a> {
 }
 
 impl Side<'_> {
-    /// Mean grey levels of the first pixels beside the edge, outwards, as far as they lie in
-    /// the gauge; near its border of those beside that.
-    fn profile<T: Grey>(&self, strip: &Strip<'_, T>) -> [f64; GROOVE_PX] {
-        let mut sums = [0; GROOVE_PX];
-        for place in self.places {
-            let nearest = whole(narrow(place.at));
-            let first =
-                if self.is_after() { nearest + 1 } else { nearest.saturating_sub(GROOVE_PX) };
-            let first = first.min(strip.across.saturating_sub(GROOVE_PX));
-            for row in place.rows.0..place.rows.1 {
-                let Some(pixels) = strip.row(row)[first..].first_chunk::<GROOVE_PX>() else {
-                    continue;
-                };
-                for (sum, pixel) in sums.iter_mut().zip(pixels) {
-                    *sum += pixel.level();
-                }
-            }
-        }
-        if !self.is_after() {
-            sums.reverse();
-        }
-        let scale = f64::from(strip.scale) / float(self.rows().max(1));
-        sums.map(|sum: u32| scale * f64::from(sum))
-    }
-
     /// Whether it lies at higher positions than the edge.
     fn is_after(&self) -> bool {
         self.outwards > 0.0
-    }
-
-    /// Number of rows.
-    fn rows(&self) -> usize {
-        self.places.iter().map(|place| place.rows.1 - place.rows.0).sum()
     }
 }
 
@@ -211,19 +174,6 @@ impl Ground {
         let sum = covariance(0) - noise * noise + 2.0 * later.sum::<f64>();
         sum.max(0.0) / float(count)
     }
-}
-
-/// Whether what lies beside an edge becomes brighter again away from it, as beyond a
-/// narrow groove. `noise` is the standard deviation of a pixel's, `contrast` the step
-/// \[grey levels\].
-pub fn rises<T: Grey>(strip: &Strip<'_, T>, side: &Side<'_>, noise: f64, contrast: f64) -> bool {
-    let mut darkest = f64::INFINITY;
-    let mut rise: f64 = 0.0;
-    for grey in side.profile(strip) {
-        darkest = darkest.min(grey);
-        rise = rise.max(grey - darkest);
-    }
-    rise > RISE * contrast + RISE_SIGMAS * noise / float(side.rows().max(1)).sqrt()
 }
 
 /// Takes the straight line through each column out of it.

@@ -76,8 +76,9 @@ impl BlurShapes {
             let found = again(table, is_near.then_some(before));
             let [Some(left), Some(right)] = found else { continue };
             let fits = looks.iter().zip([&left, &right]);
-            let gained =
-                fits.map(|(lens, other)| lens.samples() * (lens.misfit() - other.misfit()));
+            let gained = fits.map(|(lens, other)| {
+                lens.samples() * (lens.misfit_of_all() - other.misfit_of_all())
+            });
             let gained = gained.sum();
             if gained > gain {
                 gain = gained;

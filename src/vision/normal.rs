@@ -35,6 +35,38 @@ impl<const N: usize> Normal<N> {
         self.vector[which] += weight * miss;
     }
 
+    /// The equations with those of other observations.
+    #[inline(always)]
+    pub fn plus(&self, other: &Self) -> Self {
+        let sum = |row: usize, column: usize| self.matrix[row][column] + other.matrix[row][column];
+        Self {
+            matrix: std::array::from_fn(|row| std::array::from_fn(|column| sum(row, column))),
+            vector: self.vector + other.vector,
+        }
+    }
+
+    /// By how much a step lowers the sum of squared misses.
+    #[inline(always)]
+    pub fn lowered_by(&self, step: &SVector<f64, N>) -> f64 {
+        2.0 * self.vector.dot(step) - (SMatrix::from(self.matrix) * step).dot(step)
+    }
+
+    /// The equations about where a step leads.
+    #[inline(always)]
+    pub fn after(&self, step: &SVector<f64, N>) -> Self {
+        let vector = self.vector - SMatrix::from(self.matrix) * step;
+        Self { matrix: self.matrix, vector }
+    }
+
+    /// The equations of some unknowns alone.
+    #[inline(always)]
+    pub fn part<const M: usize>(&self, of: [usize; M]) -> Part<M> {
+        Part {
+            matrix: SMatrix::from_fn(|row, column| self.matrix[of[row]][of[column]]),
+            vector: SVector::from_fn(|row, _| self.vector[of[row]]),
+        }
+    }
+
     /// Solves them; `None` where they have no solution.
     pub fn solve(&mut self) -> Option<Solved<N>>
     where
@@ -47,6 +79,22 @@ impl<const N: usize> Normal<N> {
         let cholesky = Cholesky::new(SMatrix::from(self.matrix))?;
         let unknowns = cholesky.solve(&self.vector);
         Some(Solved { unknowns, cholesky })
+    }
+}
+
+/// Normal equations of some of the unknowns.
+pub struct Part<const M: usize> {
+    matrix: SMatrix<f64, M, M>,
+    vector: SVector<f64, M>,
+}
+
+impl<const M: usize> Part<M> {
+    /// By how much the unknowns can lower the sum of squared misses; 0 where the
+    /// observations do not tell them.
+    #[inline(always)]
+    pub fn lowers(&self) -> f64 {
+        let unknowns = Cholesky::new(self.matrix);
+        unknowns.map_or(0.0, |unknowns| self.vector.dot(&unknowns.solve(&self.vector)))
     }
 }
 

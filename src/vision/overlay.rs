@@ -11,10 +11,14 @@ use super::sheet::Sheet;
 
 mod curved;
 mod flank;
+mod groove;
+mod linear;
 mod shape;
+mod skew;
 mod slopes;
 
 pub use shape::{Extent, Look, Shape, Step};
+pub use skew::EdgeSkew;
 
 /// Rows that are laid over each other at most.
 const ROWS: usize = 100;

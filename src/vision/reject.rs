@@ -214,11 +214,11 @@ impl fmt::Display for Reject {
             ),
             Self::Corner { got_widths, least_widths } if *got_widths <= 0.0 => write!(
                 f,
-                "the bead turns a corner within the gauge, measured are bends with a radius of {least_widths:.1} widths or more; a shorter gauge, or one where the bead runs straight, helps"
+                "the bead turns a corner within the gauge, measured are bends with a radius of {least_widths:.1} widths or more; a shorter gauge, or one where the bead runs straight, helps; edges may look bent, too, because they are rough, which a longer gauge evens out, or because the camera's gamma is not given"
             ),
             Self::Corner { got_widths, least_widths } => write!(
                 f,
-                "the bead bends with a radius of {got_widths:.1} widths, measured are {least_widths:.1} or more; a shorter gauge, or one where the bead bends less, helps"
+                "the bead bends with a radius of {got_widths:.1} widths, measured are {least_widths:.1} or more; a shorter gauge, or one where the bead bends less, helps; edges may look bent, too, because they are rough, which a longer gauge evens out, or because the camera's gamma is not given"
             ),
             Self::Scattered { got_px, limit_px } => write!(
                 f,

@@ -11,9 +11,8 @@ mod uncover;
 mod winding;
 
 use super::cut_off::CutOff;
-use super::noise;
 use super::number::{float, narrow};
-use super::overlay::{Extent, Look, Overlay, REACH, Shape, Step};
+use super::overlay::{EdgeSkew, Extent, Look, Overlay, REACH, Shape, Step};
 use super::path::{self, Course};
 use super::pool::{self, Bands};
 use super::refine::{Refiner, Task};
@@ -277,6 +276,19 @@ impl Tracer {
         self.seen.as_ref()
     }
 
+    /// Whether a narrow groove may lie beside the edge, after it or before it. `noise` is the
+    /// standard deviation of a pixel in shares of the step.
+    pub fn is_beside_groove(&self, after: bool, noise: f64) -> bool {
+        self.misfit.is_finite() && self.overlay.rises_beside(after, noise)
+    }
+
+    /// How skewed the edge's flank is; `None` where it is not located as a blurred step
+    /// that nothing covers.
+    pub fn skew(&self, table: &StepTable) -> Option<EdgeSkew> {
+        let is_step = self.state == State::Open && self.misfit.is_finite();
+        self.overlay.skew(table, self.seen.as_ref().filter(|_| is_step)?)
+    }
+
     /// Looks at the same rows once more, with another shape of the blur, from a look at
     /// them on or from nothing. What is known of a texture stays.
     #[inline(always)]
@@ -345,14 +357,12 @@ impl Tracer {
         let Some(seen) = &self.seen else { return false };
         let Some(shape) = self.overlay.shape(table, seen, blur) else { return false };
         let aside = shape.step.at;
-        let is_bare = noise::is_taken_away(scene.noise, scene.strip);
-        let of_misfit = if is_bare { seen.variance_of_misfit() } else { 0.0 };
         let shape = self.adopt(shape);
         if aside.abs() > FAR_ASIDE_PX {
             self.read(scene);
         }
         self.blur_px = shape.step.blur;
-        self.common_variance = shape.variance + of_misfit;
+        self.common_variance = shape.variance;
         self.tabulate(table, &shape);
         for _ in 0..MAX_PASSES {
             self.hold(scene);

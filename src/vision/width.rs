@@ -62,6 +62,19 @@ pub struct Hints {
     pub saturated_share: f64,
     /// Share of the caliper lines that the width comes from.
     pub used_share: f64,
+    /// How far the skew of the flanks moves the width; none where it was not asked for, or
+    /// the edges are no blurred steps.
+    pub skew: Option<Skew>,
+}
+
+/// How far the skew of the edges' flanks moves a width in the picture: by a camera's gamma
+/// that is not given, rounded shoulders of a bead, or a penumbra.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Skew {
+    /// Measured less true width \[px\].
+    pub offset_px: f64,
+    /// Variance of that \[px²\].
+    pub variance: f64,
 }
 
 /// The edges as they were found, caliper by caliper, in raw image pixels.

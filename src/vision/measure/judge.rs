@@ -3,7 +3,7 @@
 
 use super::Work;
 use crate::vision::gauge::EdgeKind;
-use crate::vision::ground::{self, Place, Side};
+use crate::vision::ground::{Place, Side};
 use crate::vision::number::float;
 use crate::vision::outlier;
 use crate::vision::rank;
@@ -143,7 +143,7 @@ impl Work {
             let blur_px = tracer.blur_px;
             let side = Side { places: &self.places, outwards, blur_px, room_px: f64::INFINITY };
             if self.gauge.edge == EdgeKind::Auto {
-                self.is_beside_groove |= ground::rises(strip, &side, noise, contrast);
+                self.is_beside_groove |= tracer.is_beside_groove(outwards > 0.0, noise / contrast);
             }
             let Some(pattern) = self.ground.pattern(strip, &side, noise) else { continue };
             *strength = pattern.size_grey / contrast;

@@ -38,6 +38,7 @@ impl Work {
         let (lefts, rights) = (&lefts.all()[pair.pair.left].at, &rights.all()[pair.pair.right].at);
         let about = about(lefts, rights, strip.across);
         self.noise = noise::of(strip, about);
+        self.is_compressed = noise::is_taken_away(self.noise, strip);
         self.width_px = narrowest(lefts, rights, &mut self.memory);
         let scene = Scene {
             strip,

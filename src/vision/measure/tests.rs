@@ -22,12 +22,17 @@ fn frame() -> Frame {
 
 /// The same light seen by a camera with a gamma.
 fn frame_of_gamma(gamma: f64, seed: u64) -> Frame {
+    frame_of_gamma_in_noise(gamma, 2.0, seed)
+}
+
+/// The same with another noise of the light.
+fn frame_of_gamma_in_noise(gamma: f64, noise_grey: f64, seed: u64) -> Frame {
     let mut random = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
     let share = |x: f64| 0.5 * (1.0 + libm::erf(x / (1.5 * std::f64::consts::SQRT_2)));
     let mut level = |x: u16| {
         let [left, right] = EDGES.map(|edge| share(f64::from(x) - edge));
-        let light = 70.0 + 80.0 * (left - right) + 2.0 * noise();
+        let light = 70.0 + 80.0 * (left - right) + noise_grey * noise();
         255.0 * (light.max(0.0) / 255.0).powf(gamma)
     };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "8 bits")]
@@ -124,6 +129,43 @@ fn a_given_gamma_is_taken_out_before_edges_are_found() {
     }
     let uncorrected = width(0.45, None);
     assert!(uncorrected - linear > 0.1, "{uncorrected} for {linear}");
+}
+
+/// Frames of a camera whose gamma is not given tell together how far off their widths are.
+#[test]
+fn skewed_flanks_tell_how_far_widths_are_off() {
+    let scale = SurfaceMap::from_scale(1.0);
+    let told = |gamma| {
+        let (mut sum, mut weight, mut error) = (0.0, 0.0, 0.0);
+        for seed in 1..=100 {
+            let mut measurer = Measurer::new(gauge(0, 400), None);
+            let found = measurer.measure(&frame_of_gamma(gamma, seed), &scale).unwrap();
+            error += 0.01 * (found.width.get() - 240.0);
+            // None where another way of measuring tells more.
+            let Some(skew) = measurer.with_skew(found).hints.skew else { continue };
+            sum += skew.offset_px / skew.variance;
+            weight += 1.0 / skew.variance;
+        }
+        (sum / weight, 1.0 / f64::sqrt(weight), error)
+    };
+    let (offset, sigma, error) = told(1.0);
+    assert!(offset.abs() < 3.5 * sigma && sigma < 0.05, "{offset} ± {sigma}");
+    assert!(error.abs() < 0.02, "{error}");
+    for gamma in [0.45, 1.5] {
+        let (offset, sigma, error) = told(gamma);
+        assert!((offset - error).abs() < 3.5 * sigma, "{gamma}: {offset} ± {sigma} for {error}");
+        assert!(offset.abs() > 4.0 * sigma, "{gamma}: {offset} ± {sigma}");
+    }
+}
+
+/// Where a single frame shows the skew, its standard deviation contains it.
+#[test]
+fn sigma_contains_a_skew_that_shows() {
+    let scale = SurfaceMap::from_scale(1.0);
+    let frame = frame_of_gamma_in_noise(0.45, 0.2, 3);
+    let found = Measurer::new(gauge(0, 400), None).measure(&frame, &scale).unwrap();
+    let error = found.width.get() - 240.0;
+    assert!(error > 0.3 && error < 1.5 * found.sigma.get(), "{error} ± {}", found.sigma);
 }
 
 #[test]

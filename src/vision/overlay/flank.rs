@@ -109,6 +109,7 @@ impl Overlay {
         let (mut normal, misfit) = self.linearise_flanks(table, &look);
         hold(&mut normal, &look, known);
         look.noise = look.pixel_noise.max(misfit.sqrt());
+        look.residual = look.noise;
         let solved = normal.solve()?;
         look.blur_sd = look.noise * solved.variance(1).max(0.0).sqrt();
         look.doubt = look.noise * look.noise * doubt(&mut normal)?;

@@ -4,9 +4,8 @@
 use super::flank::Flank;
 pub(super) use super::flank::Flanks;
 use super::slopes::Slopes;
-use super::{Overlay, PHASES, REACH, ROUNDING};
+use super::{Overlay, REACH, ROUNDING};
 use crate::vision::line::Line;
-use crate::vision::normal::Normal;
 use crate::vision::number::float;
 use crate::vision::step::StepTable;
 
@@ -63,8 +62,13 @@ pub struct Look {
     pub(super) shading: [f64; 2],
     /// Standard deviation of a pixel, in shares of the step.
     pub(super) pixel_noise: f64,
-    /// Standard deviation of a row's samples about the step, in shares of it.
+    /// Standard deviation of a row's samples about the step before the fit's last move, in
+    /// shares of it.
     pub(super) noise: f64,
+    /// The same after it, where each phase has a place and levels of its own.
+    pub(super) residual: f64,
+    /// Number of the phases that have rows.
+    phases: f64,
     /// How far there is nothing but this edge.
     pub room: Extent,
     /// Steps beside it that reach into its pixels.
@@ -103,23 +107,31 @@ impl Look {
     }
 
     /// Mean square of the residuals about the edge, in variances of their noise: at
-    /// least 1.
+    /// least 1. Each phase has a place and levels of its own, so that they are those of the
+    /// step's shape.
     pub fn misfit(&self) -> f64 {
-        (self.noise / self.pixel_noise).powi(2)
+        (self.residual / self.pixel_noise).powi(2)
     }
 
-    /// Variance of the edge's place from residuals that all rows share, as those of a
-    /// compression do \[px²\]: the Cramér–Rao bound for a profile with so much noise.
-    pub fn variance_of_misfit(&self) -> f64 {
-        let excess = self.pixel_noise.powi(2) * (self.misfit() - 1.0);
-        2.0 * std::f64::consts::PI.sqrt() * self.step.blur * excess
+    /// The same of one place and levels for all phases.
+    pub fn misfit_of_all(&self) -> f64 {
+        (self.noise / self.pixel_noise).powi(2)
     }
 
     /// Number of samples about the edge that the misfit is the mean of.
     pub fn samples(&self) -> f64 {
         let reach = FIT_BLURS * self.step.blur + FIT_BESIDE_PX;
         let Extent { before, after } = self.room;
-        float(PHASES) * (reach.min(before) + reach.min(after))
+        self.phases * (reach.min(before) + reach.min(after))
+    }
+
+    /// Ends of the samples about the edge that are fitted \[px from the path\].
+    #[inline(always)]
+    pub(super) fn fitted(&self) -> (f64, f64) {
+        let reach = FIT_BLURS * self.step.blur + FIT_BESIDE_PX;
+        let from = (self.step.at - reach.min(self.room.before)).max(-place_limit());
+        let to = (self.step.at + reach.min(self.room.after)).min(place_limit());
+        (from, to)
     }
 
     /// Derivatives of the level at a distance from the path for the step's place
@@ -155,7 +167,13 @@ impl Look {
     /// `noise` is what independent ones as unsure would have.
     pub fn in_texture(self, noise: f64) -> Self {
         let blur_sd = self.blur_sd * (noise / self.noise).max(1.0);
-        Self { blur_sd, pixel_noise: noise, noise: noise.max(self.noise), ..self }
+        Self {
+            blur_sd,
+            pixel_noise: noise,
+            noise: noise.max(self.noise),
+            residual: noise.max(self.residual),
+            ..self
+        }
     }
 }
 
@@ -228,6 +246,8 @@ impl Overlay {
             shading: [0.0; 2],
             pixel_noise: noise,
             noise,
+            residual: noise,
+            phases: float(self.means().count()),
             room,
             flanks: Flanks::default(),
             doubt: 0.0,
@@ -327,21 +347,21 @@ impl Overlay {
     fn fit(&self, table: &StepTable, start: Look, known: Option<(f64, f64)>) -> Option<Look> {
         let mut look = start;
         let mut last = None;
+        let hold = |sd: f64| (start.noise / sd).powi(2);
         // Shading is held near none, because over a short way it could pass
         // for a shift of the edge.
+        let of_shading = (start.pixel_noise / SHADING_SD).powi(2);
         for _ in 0..MAX_STEPS {
-            let Look { step, noise, .. } = look;
-            let (mut normal, misfit) = self.linearise(table, &look);
-            let hold = |noise: f64, sd: f64| (noise / sd).powi(2);
-            normal.hold(4, hold(start.pixel_noise, SHADING_SD), -look.shading[0]);
-            normal.hold(5, hold(start.pixel_noise, SHADING_SD), -look.shading[1]);
+            let step = look.step;
+            let linear = self.linearise(table, &look);
+            let mut normal = linear.normal();
+            normal.hold(4, of_shading, -look.shading[0]);
+            normal.hold(5, of_shading, -look.shading[1]);
             if let Some((mean, sd)) = known {
-                normal.hold(1, hold(noise, sd), mean - step.blur);
+                normal.hold(1, hold(sd), mean - step.blur);
             }
             let solved = normal.solve()?;
             let moved = solved.unknowns;
-            // What the model leaves is noise, if not of the pixels.
-            look.noise = start.pixel_noise.max(misfit.sqrt());
             look.step = Step {
                 at: step.at + moved[0].clamp(-step.blur, step.blur),
                 blur: (step.blur + moved[1].clamp(-0.5 * step.blur, 0.5 * step.blur))
@@ -351,36 +371,22 @@ impl Overlay {
             };
             look.shading[0] += moved[4];
             look.shading[1] += moved[5];
-            last = Some(solved);
+            last = Some((linear, solved));
             if moved[0].abs() < CONVERGED && moved[1].abs() < CONVERGED * step.blur {
                 break;
             }
         }
-        look.blur_sd = look.noise * last?.variance(1).max(0.0).sqrt();
+        let (linear, solved) = last?;
+        // What the model leaves is noise, if not of the pixels.
+        look.noise = start.pixel_noise.max(linear.mean_square().sqrt());
+        look.residual = start.pixel_noise;
+        if look.noise > start.pixel_noise {
+            let within_phases = linear.within_phases_after(&solved.unknowns);
+            look.residual = start.pixel_noise.max(within_phases.sqrt());
+        }
+        look.blur_sd = look.noise * solved.variance(1).max(0.0).sqrt();
         let inside = look.step.at > -look.room.before && look.step.at < look.room.after;
         (inside && look.step.after - look.step.before > 0.1).then_some(look)
-    }
-
-    /// Normal equations about a step, and the mean square of what it leaves,
-    /// for a sample of weight 1.
-    #[inline(always)]
-    fn linearise(&self, table: &StepTable, look: &Look) -> (Normal<6>, f64) {
-        let Look { step: edge, room, .. } = *look;
-        let reach = FIT_BLURS * edge.blur + FIT_BESIDE_PX;
-        let from = (edge.at - reach.min(room.before)).max(-place_limit());
-        let to = (edge.at + reach.min(room.after)).min(place_limit());
-        let mut normal = Normal::<6>::default();
-        let (mut square, mut n) = (0.0, -6.0);
-        for mean in self.means() {
-            for (at, value) in mean.samples(from, to) {
-                let (row, level) = look.linear_at(table, at);
-                let miss = value - level;
-                square += mean.weight * miss * miss;
-                n += 1.0;
-                normal.add(row, miss, mean.weight);
-            }
-        }
-        (normal, square / f64::max(n, 1.0))
     }
 
     /// One side of the edge: along a straight line, or along a parabola where

@@ -1,0 +1,33 @@
+//! Whether a narrow groove may lie beside an edge.
+
+use super::{Overlay, PHASES, REACH};
+
+/// Places beside the edge within which a narrow groove lies \[px\].
+const GROOVE_PX: usize = 9;
+/// By how much what lies beyond a groove is nearer to the bead's level at least: a fraction
+/// of the step, and standard deviations of noise.
+const RISE: f64 = 0.015;
+const RISE_SIGMAS: f64 = 5.0;
+
+impl Overlay {
+    /// Whether the level beside the edge, after it or before it, comes nearer to that on its
+    /// other side again farther out, as beyond a narrow groove. `noise` is the standard
+    /// deviation of a pixel in shares of the step.
+    pub fn rises_beside(&self, after: bool, noise: f64) -> bool {
+        let rows = self.used();
+        if rows <= 0.0 {
+            return false;
+        }
+        let (mut lowest, mut rise) = (f64::INFINITY, 0.0_f64);
+        for away in 1..=GROOVE_PX {
+            let at = if after { REACH + away } else { REACH - away };
+            let sum: f64 = (0..PHASES)
+                .map(|phase| f64::from(self.counts[phase]) * f64::from(self.mean[phase][at]))
+                .sum();
+            let level = if after { 1.0 - sum / rows } else { sum / rows };
+            lowest = lowest.min(level);
+            rise = rise.max(level - lowest);
+        }
+        rise > RISE + RISE_SIGMAS * noise / rows.sqrt()
+    }
+}
