@@ -2,6 +2,7 @@
 //! width.
 
 mod choice;
+mod compressed;
 mod even;
 mod judge;
 mod locate;
@@ -49,14 +50,6 @@ const OFF_PX: f64 = 0.3;
 const OVERLAP: f64 = 0.045;
 const NARROWEST_BLURS: f64 = 4.0;
 const OVERLAP_BLURS: f64 = 3.0;
-
-/// Noise of a profile that moves its edges as a compression does that takes the pixels' noise
-/// away \[grey levels\]. Straight edges of rendered JPEGs with a noise of 4 were off as by 2.2
-/// at qualities of 30 to 36, 2.0 to 44 and 1.1 to 53, however far their profiles were from
-/// steps; with 1.7 the z of all of them is 1.
-const COMPRESSION_GREY: f64 = 1.7;
-/// Fraction of saturated pixels from which on these have no noise, and not a compression.
-const FEW_SATURATED: f64 = 0.01;
 
 /// Measures frames of one cell; keeps its memory from frame to frame.
 #[derive(Debug, Clone)]
@@ -274,12 +267,6 @@ fn overlap_variance(width_px: f64, blur_px: f64) -> f64 {
     0.5 * (OVERLAP * blur_px * libm::exp((NARROWEST_BLURS - blurs) / OVERLAP_BLURS)).powi(2)
 }
 
-/// Variance of an edge's place from what a compression leaves of its profile, which all rows
-/// share \[px²\]: the Cramér–Rao bound for a profile with so much noise.
-fn variance_of_compression(blur_px: f64, contrast_grey: f64) -> f64 {
-    2.0 * std::f64::consts::PI.sqrt() * blur_px * (COMPRESSION_GREY / contrast_grey).powi(2)
-}
-
 /// Refuses images of another size than those that the calibration was made with.
 fn check_size(image: (usize, usize), surface: &SurfaceMap) -> Result<(), Reject> {
     let Some(calibrated) = surface.image_size_px() else { return Ok(()) };
@@ -383,15 +370,8 @@ impl Work {
         }
         let width_px = self.right.middle() - self.left.middle();
         let skew_variance = self.skew_variance();
-        let of_compression = |tracer: &Tracer| {
-            if self.is_compressed && hints.saturated_share < FEW_SATURATED {
-                variance_of_compression(tracer.blur_px, hints.contrast_grey)
-            } else {
-                0.0
-            }
-        };
         let sides = [&self.left, &self.right].map(|tracer| {
-            let of_compression = of_compression(tracer);
+            let of_compression = self.variance_of_compression(tracer, hints.contrast_grey);
             // What rows vary by, where that is known, has some of the compression in it.
             let mean_variance = tracer.mean_variance.map(|known| known.max(of_compression));
             let of_steps = if mean_variance.is_none() { of_compression } else { 0.0 };

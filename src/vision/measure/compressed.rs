@@ -1,0 +1,25 @@
+//! What a compression of the picture leaves open of a width.
+
+use super::Work;
+use crate::vision::trace::Tracer;
+
+/// Noise of a profile that moves its edges as a compression does that takes the pixels' noise
+/// away \[grey levels\]. Straight edges of rendered JPEGs with a noise of 4 were off as by 2.2
+/// at qualities of 30 to 36, 2.0 to 44 and 1.1 to 53, however far their profiles were from
+/// steps; with 1.7 the z of all of them is 1.
+const COMPRESSION_GREY: f64 = 1.7;
+/// Fraction of saturated pixels from which on these have no noise, and not a compression.
+const FEW_SATURATED: f64 = 0.01;
+
+impl Work {
+    /// Variance of an edge's place from what a compression leaves of its profile, which all
+    /// rows share \[px²\]: the Cramér–Rao bound for a profile with so much noise. 0 where the
+    /// pixels' noise is there.
+    pub(super) fn variance_of_compression(&self, edge: &Tracer, contrast_grey: f64) -> f64 {
+        if !self.is_compressed || self.bands.saturated_share() >= FEW_SATURATED {
+            return 0.0;
+        }
+        let noise = COMPRESSION_GREY / contrast_grey;
+        2.0 * std::f64::consts::PI.sqrt() * edge.blur_px * noise * noise
+    }
+}
