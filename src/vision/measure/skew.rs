@@ -1,11 +1,10 @@
 //! What the skew of both edges' flanks makes of a width.
 
 use super::{Way, Work};
+use crate::vision::overlay::Look;
 use crate::vision::trace::Tracer;
 use crate::vision::width::Skew;
 
-/// Misfit of a blurred step from which on a frame may show a skew by itself.
-const STRANGE: f64 = 1.3;
 /// Standard deviations of a skew from which on it shows: from 3 on, one clean frame in 1,500 had
 /// as much by noise.
 const SHOWS: f64 = 4.0;
@@ -27,7 +26,7 @@ impl Work {
 
     /// Variance that a skew adds to the width where the frame shows it \[px²\].
     pub(super) fn skew_variance(&self) -> f64 {
-        let is_strange = |edge: &Tracer| edge.seen().is_some_and(|look| look.misfit() > STRANGE);
+        let is_strange = |edge: &Tracer| edge.seen().is_some_and(Look::is_strange);
         if !is_strange(&self.left) && !is_strange(&self.right) {
             return 0.0;
         }

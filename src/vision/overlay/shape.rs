@@ -113,7 +113,12 @@ impl Look {
         (self.residual / self.pixel_noise).powi(2)
     }
 
-    /// The same of one place and levels for all phases.
+    /// Whether the step leaves more than noise does.
+    pub fn is_strange(&self) -> bool {
+        self.misfit() >= STRANGE
+    }
+
+    /// The misfit of one place and levels for all phases.
     pub fn misfit_of_all(&self) -> f64 {
         (self.noise / self.pixel_noise).powi(2)
     }
@@ -258,7 +263,7 @@ impl Overlay {
             let start = Look { flanks, ..look };
             return Some(self.fit_flanks(table, &start, None).unwrap_or(look));
         }
-        if look.misfit() < STRANGE {
+        if !look.is_strange() {
             return Some(look);
         }
         // A weaker step beside it, if that explains what is left.
@@ -266,7 +271,7 @@ impl Overlay {
         let (_, flanks) = self.up_to_neighbours(&slopes, step, weaker, whole_room);
         let start = Look { flanks: flanks.near(&look.step), ..look };
         let found = start.flanks.any().then(|| self.fit_flanks(table, &start, None)).flatten();
-        Some(found.filter(|found| found.misfit() < STRANGE).unwrap_or(look))
+        Some(found.filter(|found| !found.is_strange()).unwrap_or(look))
     }
 
     /// Fits the edge of a look with another shape of the blur.
