@@ -91,8 +91,8 @@ impl Ground {
     }
 
     /// Standard deviation of the texture along a side, without the pixels' noise
-    /// \[grey levels\], from the median of how far pixels are off: a few sparks or holes
-    /// are none. `None` as for a pattern.
+    /// \[grey levels\], from the median of how far pixels are off their median: sparks or
+    /// holes, which move a mean, are none. `None` as for a pattern.
     #[inline(always)]
     pub fn texture<T: Grey>(
         &mut self,
@@ -103,9 +103,10 @@ impl Ground {
         let mut variances = self.look(strip, side, noise)?;
         for (column, variance) in variances.iter_mut().enumerate().take(self.columns) {
             self.column.clear();
-            self.column.extend(self.lines.iter().map(|line| line[column].abs()));
-            let median = f64::from(rank::median(&mut self.column)?);
-            *variance = narrow((rank::SIGMA_PER_MEDIAN * median).powi(2));
+            self.column.extend(self.lines.iter().map(|line| line[column]));
+            let median = rank::median(&mut self.column)?;
+            let deviation = f64::from(rank::median_deviation(&mut self.column, median)?);
+            *variance = narrow((rank::SIGMA_PER_MEDIAN * deviation).powi(2));
         }
         self.without_noise(&mut variances, noise)
     }

@@ -38,6 +38,16 @@ pub fn median<T: Ordered>(values: &mut [T]) -> Option<T> {
     at(values, middle)
 }
 
+/// Median of how far values lie from `median`; their magnitudes are left in their place.
+/// `None` of none.
+#[inline(always)]
+pub fn median_deviation(values: &mut [f32], median: f32) -> Option<f32> {
+    for value in &mut *values {
+        *value = (*value - median).abs();
+    }
+    self::median(values)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -49,5 +59,12 @@ mod tests {
         assert_eq!(median(&mut values), Some(5.0));
         assert_eq!(median(&mut values[..0]), None);
         assert_eq!(at(&mut [1.0f32], 1), None);
+    }
+
+    #[test]
+    fn a_few_far_values_change_no_deviation() {
+        let mut values = [1.0, 2.0, 3.0, 4.0, 900.0];
+        assert_eq!(median_deviation(&mut values, 3.0), Some(1.0));
+        assert_eq!(median_deviation(&mut [], 0.0), None);
     }
 }

@@ -119,8 +119,8 @@ impl Weights {
         let levels = ground.windows(self.pixels).map(|window| product(&share, window) / sum);
         let mut levels: Vec<f32> = levels.map(narrow).collect();
         let Some(middle) = rank::median(&mut levels) else { return true };
-        let mut off: Vec<f32> = levels.iter().map(|value| (value - middle).abs()).collect();
-        let spread = rank::SIGMA_PER_MEDIAN * rank::median(&mut off).map_or(0.0, f64::from);
+        let deviation = rank::median_deviation(&mut levels, middle).map_or(0.0, f64::from);
+        let spread = rank::SIGMA_PER_MEDIAN * deviation;
         (level - f64::from(middle)).abs() < UNLIKE * spread + NEARLY * step
     }
 

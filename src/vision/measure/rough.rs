@@ -1,6 +1,5 @@
 //! Beads whose edges are no blurred steps: torn ones, grooves, texture.
 
-use super::choice::has_grains;
 use super::patterned::check_pattern;
 use super::{NEED_SHARE, Work, even};
 use crate::calib::SurfaceMap;
@@ -54,7 +53,7 @@ impl Work {
             return Err(*refused);
         }
         let fits = self.fit_rough(strip, &pair)?;
-        if is_covered(refused) && fits.iter().any(has_grains) {
+        if is_covered(refused) && self.may_be_grains(refused, &fits) {
             return Err(*refused);
         }
         self.take_rough_beside(pattern, is_textured, &fits, strip, view, surface)

@@ -444,10 +444,7 @@ fn bead_levels(blocks: &[Profile], mean: &MeanProfile) -> Vec<BeadLevel> {
         values.extend(profile[from..to].chunks(4).map(|places| places[0]));
     }
     let median = rank::median(&mut values).unwrap_or(0.0);
-    for value in &mut values {
-        *value = (*value - median).abs();
-    }
-    let spread = rank::median(&mut values).unwrap_or(0.0);
+    let spread = rank::median_deviation(&mut values, median).unwrap_or(0.0);
     let contrast = median - mean.grey[darkest_of(&mean.grey, 0)];
     let limit = median - (HOLE_SPREADS * spread).max(HOLE * contrast);
     let mut levels = Vec::with_capacity(blocks.len());
