@@ -51,6 +51,7 @@ mod fit;
 mod gamma;
 pub mod gauge;
 mod ground;
+mod light;
 mod line;
 mod mean_edge;
 mod measure;

@@ -29,7 +29,7 @@ use super::gauge::{Gauge, Method};
 use super::ground::{Ground, Place};
 use super::mean_edge::MeanEdge;
 use super::motion::BlurShapes;
-use super::noise;
+use super::noise::PixelNoise;
 use super::number::float;
 use super::parallel::Parallel;
 use super::pool::{self, Bands};
@@ -78,9 +78,7 @@ struct Work {
     blur_shapes: BlurShapes,
     bands: Bands,
     lines: Vec<(usize, usize)>,
-    noise: f32,
-    /// Whether a compression, or the camera, took the noise away.
-    is_compressed: bool,
+    noise: PixelNoise,
     /// Scale across the gauge's middle.
     mm_per_px: f64,
     width_px: f32,
@@ -123,8 +121,7 @@ impl Measurer {
             blur_shapes: BlurShapes::default(),
             bands: Bands::default(),
             lines: Vec::new(),
-            noise: 0.0,
-            is_compressed: false,
+            noise: PixelNoise::default(),
             mm_per_px: 0.0,
             width_px: 0.0,
             memory: Vec::new(),
@@ -283,8 +280,7 @@ impl Work {
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
         let range = self.search_range(view, surface)?;
-        self.noise = noise::of(strip, 0..strip.across);
-        self.is_compressed = noise::is_taken_away(self.noise, strip);
+        self.noise = PixelNoise::read(strip, 0..strip.across);
         self.bands.pool(strip, self.gauge.calipers);
         pool::cut(strip.along, self.gauge.calipers, &mut self.lines);
         self.find_candidates();
@@ -355,7 +351,7 @@ impl Work {
         let hints = Hints {
             contrast_grey: f64::midpoint(self.contrasts[0], self.contrasts[1]),
             blur_px: f64::midpoint(self.left.blur_px, self.right.blur_px),
-            noise_grey: self.noise.into(),
+            noise_grey: self.noise.grey.into(),
             saturated_share: self.bands.saturated_share(),
             used_share: f64::midpoint(self.left.used_share(), self.right.used_share()),
             skew: None,

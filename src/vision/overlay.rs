@@ -17,7 +17,7 @@ mod shape;
 mod skew;
 mod slopes;
 
-pub use shape::{Extent, Look, Shape, Step};
+pub use shape::{Extent, Look, Shading, Shape, Step};
 pub use skew::EdgeSkew;
 
 /// Rows that are laid over each other at most.

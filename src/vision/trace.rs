@@ -11,6 +11,7 @@ mod uncover;
 mod winding;
 
 use super::cut_off::CutOff;
+use super::light::Surroundings;
 use super::number::{float, narrow};
 use super::overlay::{EdgeSkew, Extent, Look, Overlay, REACH, Shape, Step};
 use super::path::{self, Course};
@@ -109,6 +110,9 @@ pub struct Tracer {
     sheet: Sheet,
     overlay: Overlay,
     seen: Option<Look>,
+    /// What was read of the edge, and how far aside of the course it was \[px\].
+    shape: Option<Shape>,
+    aside_px: f64,
     texture: Option<Texture>,
     whitener: Whitener,
     scatter_in_texture: Option<Scatter>,
@@ -331,11 +335,28 @@ impl Tracer {
         true
     }
 
-    /// Locates the edge that was looked at, with what is known of its blur:
-    /// mean and standard deviation \[px\].
+    /// Reads the shape of the edge that was looked at, with what is known of its blur: mean
+    /// and standard deviation \[px\].
+    #[inline(always)]
+    pub fn take_shape(&mut self, table: &StepTable, blur: (f64, f64)) {
+        self.shape = None;
+        let Some(seen) = &self.seen else { return };
+        let Some(shape) = self.overlay.shape(table, seen, blur) else { return };
+        self.aside_px = shape.step.at;
+        self.shape = Some(self.adopt(shape));
+    }
+
+    /// What lies beside the edge whose shape was read, with the levels that were picked for
+    /// it \[grey levels\].
+    pub fn surroundings(&mut self) -> Option<Surroundings<'_>> {
+        let [before, step] = [&self.before, &self.step].map(|values| f64::from(typical(values)));
+        Some(Surroundings { shape: self.shape.as_mut()?, before, step })
+    }
+
+    /// Locates the edge whose shape was read; `blur` as there.
     #[inline(always)]
     pub fn trace<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>, blur: (f64, f64)) {
-        let found = self.trace_open(table, scene, blur);
+        let found = self.trace_open(table, scene);
         let is_open = found && self.unfit <= COVERED_SHARE && !self.lost_rows(scene);
         if is_open || self.trace_winding(table, scene) {
             self.state = State::Open;
@@ -348,17 +369,9 @@ impl Tracer {
 
     /// Locates the edge as if nothing covered it.
     #[inline(always)]
-    fn trace_open<T: Grey>(
-        &mut self,
-        table: &StepTable,
-        scene: &Scene<'_, T>,
-        blur: (f64, f64),
-    ) -> bool {
-        let Some(seen) = &self.seen else { return false };
-        let Some(shape) = self.overlay.shape(table, seen, blur) else { return false };
-        let aside = shape.step.at;
-        let shape = self.adopt(shape);
-        if aside.abs() > FAR_ASIDE_PX {
+    fn trace_open<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
+        let Some(shape) = self.shape else { return false };
+        if self.aside_px.abs() > FAR_ASIDE_PX {
             self.read(scene);
         }
         self.blur_px = shape.step.blur;
@@ -383,7 +396,8 @@ impl Tracer {
         let rough = picked.iter().map(|at| at.is_finite().then_some(*at));
         let seen = self.look(table, scene, rough);
         self.picked = picked;
-        let found = seen.is_some() && self.trace_open(table, scene, blur);
+        self.take_shape(table, blur);
+        let found = seen.is_some() && self.trace_open(table, scene);
         self.state = if found { State::Hidden } else { State::Unseen };
     }
 

@@ -16,7 +16,7 @@ impl Work {
     /// rows share \[px²\]: the Cramér–Rao bound for a profile with so much noise. 0 where the
     /// pixels' noise is there.
     pub(super) fn variance_of_compression(&self, edge: &Tracer, contrast_grey: f64) -> f64 {
-        if !self.is_compressed || self.bands.saturated_share() >= FEW_SATURATED {
+        if !self.noise.is_taken_away || self.bands.saturated_share() >= FEW_SATURATED {
             return 0.0;
         }
         let noise = COMPRESSION_GREY / contrast_grey;

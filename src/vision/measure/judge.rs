@@ -128,7 +128,7 @@ impl Work {
         strip: &Strip<'_, T>,
         of_both: fn(f64, f64) -> f64,
     ) -> Result<(), Reject> {
-        let noise = f64::from(self.noise);
+        let noise = f64::from(self.noise.grey);
         self.is_beside_groove = self.gauge.edge == EdgeKind::Groove;
         let mut strengths = [0.0_f64; 2];
         let sides = [(&mut self.left, -1.0), (&mut self.right, 1.0)];

@@ -5,8 +5,9 @@ use super::judge::is_strange;
 use super::search::Found;
 use super::{NEED_SHARE, OFF_PX, Way, Work};
 use crate::vision::covered;
+use crate::vision::light;
 use crate::vision::motion::BlurShapes;
-use crate::vision::noise;
+use crate::vision::noise::PixelNoise;
 use crate::vision::number::narrow;
 use crate::vision::overlay::Look;
 use crate::vision::rank;
@@ -37,14 +38,13 @@ impl Work {
         let (lefts, rights) = pair.sides(&self.ups, &self.downs);
         let (lefts, rights) = (&lefts.all()[pair.pair.left].at, &rights.all()[pair.pair.right].at);
         let about = about(lefts, rights, strip.across);
-        self.noise = noise::of(strip, about);
-        self.is_compressed = noise::is_taken_away(self.noise, strip);
+        self.noise = PixelNoise::read(strip, about);
         self.width_px = narrowest(lefts, rights, &mut self.memory);
         let scene = Scene {
             strip,
             bands: &self.bands,
             lines: &self.lines,
-            noise: self.noise,
+            noise: self.noise.grey,
             width_px: self.width_px,
             bead_after: true,
         };
@@ -66,7 +66,7 @@ impl Work {
                 (self.least_off_px, self.way) = (OFF_PX, Way::CutOff);
                 let tracers = [&mut self.left, &mut self.right];
                 let bead = saturated::Bead { scenes, lefts, rights };
-                self.noise = bead.trace(tracers, self.blur_shapes.table(), cut_off)?;
+                self.noise.grey = bead.trace(tracers, self.blur_shapes.table(), cut_off)?;
                 return Ok(());
             }
             let tracers = [&mut self.left, &mut self.right];
@@ -74,6 +74,13 @@ impl Work {
         }
         let table = self.blur_shapes.table();
         if let Some(blur) = common_blur(seen) {
+            for tracer in [&mut self.left, &mut self.right] {
+                tracer.take_shape(table, blur);
+            }
+            if let (Some(left), Some(right)) = (self.left.surroundings(), self.right.surroundings())
+            {
+                light::bend([left, right], self.width_px.into());
+            }
             for (tracer, scene) in [&mut self.left, &mut self.right].into_iter().zip(&scenes) {
                 tracer.trace(table, scene, blur);
             }

@@ -41,7 +41,7 @@ impl Work {
     /// lines \[grey levels\]; 0 where one side has none: what is on one side alone is a
     /// groove or a neighbour.
     pub(super) fn ground_pattern<T: Grey>(&mut self, strip: &Strip<'_, T>, pair: &LinePair) -> f64 {
-        let noise = f64::from(self.noise);
+        let noise = f64::from(self.noise.grey);
         let mut least = f64::INFINITY;
         let sides = self.mean_edges.iter_mut().zip(&pair.sides);
         for ((edge, line), bead_after) in sides.zip([true, false]) {
@@ -131,7 +131,7 @@ impl Work {
             place_all(tracer, &self.lines, &mut self.places);
             let blur_px = tracer.blur_px;
             let side = Side { places: &self.places, outwards: inwards, blur_px, room_px };
-            let texture = self.ground.texture(strip, &side, self.noise.into());
+            let texture = self.ground.texture(strip, &side, self.noise.grey.into());
             *share = texture.unwrap_or(0.0) / contrast;
         }
         (0.5 * (shares[0] * shares[0] + shares[1] * shares[1])).sqrt() > NOTABLE_TEXTURE
@@ -144,7 +144,7 @@ impl Work {
         pair: &LinePair,
     ) -> bool {
         let middle = 0.5 * (float(strip.along) - 1.0);
-        let noise = f64::from(self.noise);
+        let noise = f64::from(self.noise.grey);
         pair.sides.iter().zip([1.0, -1.0]).all(|(line, inwards)| {
             self.places.clear();
             self.places.extend(self.lines.iter().map(|&rows| {

@@ -133,7 +133,7 @@ impl Work {
         let scene = Scene {
             strip,
             lines: &self.lines,
-            noise: self.noise,
+            noise: self.noise.grey,
             width_px: pair.width_px(),
             bead_after: true,
             bright: pair.bright,

@@ -51,7 +51,7 @@ impl Work {
     pub(super) fn find_candidates(&mut self) {
         // A step is the difference of two means of REACH pooled pixels.
         #[expect(clippy::cast_precision_loss, reason = "REACH is small")]
-        let noise = self.noise * (2.0 / (4.0 * REACH as f32)).sqrt();
+        let noise = self.noise.grey * (2.0 / (4.0 * REACH as f32)).sqrt();
         #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
         let least = (0.4 * self.gauge.min_contrast_grey) as f32;
         let floor = least.max(FLOOR_SIGMA * noise);

@@ -78,7 +78,8 @@ impl Tracer {
             let Some(Look { room, .. }) = self.seen else { return false };
             self.pick_levels_within(scene, room);
             let Some(blur) = self.lay_over(table, scene) else { return false };
-            if !self.trace_open(table, scene, blur) {
+            self.take_shape(table, blur);
+            if !self.trace_open(table, scene) {
                 return false;
             }
             if self.unfit <= COVERED_SHARE && !self.lost_rows(scene) {

@@ -1,0 +1,118 @@
+//! Light that falls off over the gauge, as a lens's does towards its corners: it bends the
+//! levels beside an edge by less than their noise shows there, and tells by how much by its
+//! slopes at both edges.
+
+use super::number::float;
+use super::overlay::{REACH, Shading, Shape};
+
+/// How far the slopes of the light on the two sides of an edge may differ, as a fraction of
+/// their mean: those of a bead or of ground that is shaded itself are its alone.
+const ALIKE: f64 = 0.5;
+
+/// How much less the light's relative slope grows at the edges than between them where it
+/// falls off on both sides, in squares of that slope: 2/3 for a lamp, 1/(1 + r²)^1.5 of whose
+/// light arrives, 1/2 for a lens, with 1/(1 + r²)².
+const FALLS_OFF: f64 = 0.6;
+
+/// Bend of the light at the farthest sample up to which it is left out: it moves an edge by
+/// 0.001 px.
+const HARDLY: f64 = 2e-3;
+
+/// What lies beside an edge.
+#[derive(Debug)]
+pub struct Surroundings<'a> {
+    /// The edge, at its place and its levels.
+    pub shape: &'a mut Shape,
+    /// Level before it \[grey levels\].
+    pub before: f64,
+    /// Step to the level after it \[grey levels\].
+    pub step: f64,
+}
+
+impl Surroundings<'_> {
+    /// Levels before and after the edge, in shares of the step.
+    fn levels(&self) -> [f64; 2] {
+        let before = self.before / self.step;
+        [before, before + 1.0]
+    }
+
+    /// Relative change of the light at the edge \[1/px\]; `None` where the two sides do not
+    /// tell the same of it.
+    fn light(&self) -> Option<f64> {
+        let [before, after] = self.levels();
+        let [outwards, onwards] = self.shape.shading.map(|shading| shading.slope);
+        let (before, after) = (-outwards / before, onwards / after);
+        let mean = f64::midpoint(before, after);
+        let is_light = before * after > 0.0 && (after - before).abs() < ALIKE * mean.abs();
+        is_light.then_some(mean)
+    }
+
+    /// Bends what follows a straight line on either side by half of the light's relative
+    /// second derivative \[1/px²\].
+    fn bend(&mut self, relative: f64) {
+        let levels = self.levels();
+        let Shape { step, extent, shading, .. } = &mut *self.shape;
+        let ends = [extent.before, extent.after];
+        for ((shading, level), end) in shading.iter_mut().zip(levels).zip(ends) {
+            if shading.bend == 0.0 {
+                let bend = level * relative;
+                // A parabola's straight line runs as it does in the middle of its samples.
+                let middle = 0.5 * (3.0 * step.blur + end);
+                *shading = Shading { slope: shading.slope - 2.0 * bend * middle, bend };
+            }
+        }
+    }
+}
+
+/// Bends the levels beside both edges of a bead of such a width as the light does whose
+/// slopes show on all four sides.
+pub fn bend(mut edges: [Surroundings<'_>; 2], width_px: f64) {
+    let [Some(left), Some(right)] = [edges[0].light(), edges[1].light()] else { return };
+    let bends = bends([left, right], width_px);
+    if bends.iter().any(|bend| bend.abs() * float(REACH * REACH) > HARDLY) {
+        for (edge, relative) in edges.iter_mut().zip(bends) {
+            edge.bend(relative);
+        }
+    }
+}
+
+/// Half of the light's relative second derivative at either edge \[1/px²\], from its relative
+/// slopes there \[1/px\].
+fn bends([left, right]: [f64; 2], width_px: f64) -> [f64; 2] {
+    let growth = (right - left) / width_px + FALLS_OFF * (-left * right).max(0.0);
+    [left, right].map(|slope| 0.5 * (growth + slope * slope))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Bends of a light about edges at two places, and what they are in truth.
+    fn bends_of(light: impl Fn(f64) -> f64, edges: [f64; 2]) -> [[f64; 2]; 2] {
+        let slopes = edges.map(|x| (light(x + 0.5) - light(x - 0.5)) / light(x));
+        let truth =
+            edges.map(|x| 0.5 * (light(x + 1.0) - 2.0 * light(x) + light(x - 1.0)) / light(x));
+        [bends(slopes, edges[1] - edges[0]), truth]
+    }
+
+    #[test]
+    fn a_lamp_and_a_lens_bend_the_light_by_a_little_more_or_less() {
+        for (power, edges) in
+            [(1.5, [-166.0, 166.0]), (2.0, [-166.0, 166.0]), (1.5, [-120.0, 210.0])]
+        {
+            let light = |x: f64| libm::pow(1.0 + (x / 500.0) * (x / 500.0), -power);
+            let [found, truth] = bends_of(light, edges);
+            let flat = power / (500.0 * 500.0);
+            for (found, truth) in found.iter().zip(truth) {
+                assert!((found - truth).abs() < 0.15 * flat, "{found} {truth} {flat}");
+            }
+        }
+    }
+
+    #[test]
+    fn light_that_falls_evenly_is_not_bent() {
+        let slope = 0.0005;
+        let [found, _] = bends_of(|x| 1.0 - slope * x, [-166.0, 166.0]);
+        assert!(found.iter().all(|bend| bend.abs() < 0.1 * slope * slope), "{found:?}");
+    }
+}
