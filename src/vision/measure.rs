@@ -318,7 +318,7 @@ impl Work {
         if self.may_be_more_than_steps()
             && let Ok(fits) = self.find_rough(strip, range)
         {
-            if self.explains_more(&fits) {
+            if self.explains_more(&fits, &found) {
                 return self.take_rough(&fits, strip, view, surface);
             }
             self.check_flanks(&fits)?;

@@ -21,11 +21,6 @@ const LEAST: f32 = 0.2887;
 /// Noise up to which it is not told from rounding, as a multiple of that.
 const HARDLY: f32 = 1.2;
 
-/// Least noise of a pixel where that was taken away \[grey levels of 256\]: the rounding of
-/// a compression's waves leaves residuals of 1 and more about an edge, and beside less noise
-/// than that each of them would pass for roughness.
-const TAKEN_AWAY_GREY: f32 = 1.0;
-
 /// Noise of pixels.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PixelNoise {
@@ -41,9 +36,7 @@ impl PixelNoise {
     #[inline(always)]
     pub fn read<T: Grey>(strip: &Strip<'_, T>, columns: Range<usize>) -> Self {
         let grey = of(strip, columns);
-        let is_taken_away = grey < HARDLY * LEAST * strip.level_step;
-        let least = if is_taken_away { TAKEN_AWAY_GREY } else { 0.0 };
-        Self { grey: grey.max(least), is_taken_away }
+        Self { grey, is_taken_away: grey < HARDLY * LEAST * strip.level_step }
     }
 }
 

@@ -48,7 +48,7 @@ const SAME_BLUR: f64 = 0.02;
 const FINE_FRACTION: f64 = 0.2;
 
 /// How likely a groove that does not show its depth must be to be looked at.
-const LIKELY_GROOVE: f64 = 0.25;
+const LIKELY_GROOVE: f64 = 0.18;
 
 /// Standard deviation of the place of an edge beside a groove that hides its depth that its
 /// waves leave open, as a fraction of theirs and at most \[px\]: the mean over them is no Gaussian

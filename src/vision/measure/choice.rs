@@ -8,6 +8,7 @@ use super::rough::WIDEST_ROUGH_PX;
 use super::{Way, Work};
 use crate::vision::reject::Reject;
 use crate::vision::rough::RoughFit;
+use crate::vision::width::WidthMeasurement;
 
 /// Share of an edge's rows that may be sorted out: more are bays, or grains.
 const FEW_GAPS: f64 = 0.06;
@@ -20,6 +21,13 @@ const FAINTER: f64 = 0.7;
 /// the distance at which another edge is not the same \[px\].
 const LOPSIDED: f64 = 0.6;
 const ELSEWHERE_PX: f64 = 3.0;
+/// The distance of a rough edge from what was located line by line up to which both are the
+/// same \[px\].
+const SAME_PX: f64 = 0.25;
+/// Contrast of an edge as a fraction of the other's below which something else lies beside it
+/// than beside the other, so that a narrow groove may: one of 2 to 2.5 px that is a little
+/// darker than the ground moves a blurred step by a third of a pixel and shows in nothing else.
+const UNEVEN: f64 = 0.9;
 /// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a
 /// wide flank.
 const PART_OF_FLANK: f64 = 0.5;
@@ -52,7 +60,7 @@ impl Work {
             return false;
         }
         let is_other = self.is_refined() || self.is_beside_groove || self.is_wide();
-        is_other || self.has_gaps() || self.is_lopsided()
+        is_other || self.has_gaps() || self.are_uneven(UNEVEN)
     }
 
     /// Whether edges were located line by line.
@@ -108,16 +116,28 @@ impl Work {
         Ok(())
     }
 
-    /// Whether one edge is much fainter than the other, as a rib's is.
-    fn is_lopsided(&self) -> bool {
+    /// Whether one edge has less than a share of the other's contrast.
+    fn are_uneven(&self, share: f64) -> bool {
         let [left, right] = self.contrasts;
-        left.min(right) < LOPSIDED * left.max(right)
+        left.min(right) < share * left.max(right)
     }
 
     /// Whether rough edges lie elsewhere than the blurred steps.
     fn is_elsewhere(&self) -> bool {
         let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
         sides.iter().any(|(steps, rough)| (steps.middle() - rough.middle()).abs() > ELSEWHERE_PX)
+    }
+
+    /// Whether rough edges lie where edges were located line by line.
+    fn are_same(&self) -> bool {
+        let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
+        sides.iter().all(|(lines, rough)| (lines.middle() - rough.middle()).abs() < SAME_PX)
+    }
+
+    /// Whether the width between rough edges is surer than the one that was found.
+    fn are_surer(&self, fits: &[RoughFit; 2], found: &WidthMeasurement) -> bool {
+        let sigma_px = found.sigma.get() / self.mm_per_px;
+        fits.iter().map(|fit| fit.variance).sum::<f64>() < sigma_px * sigma_px
     }
 
     /// Whether a rough edge lies farther out than its blurred step, with no narrow
@@ -131,9 +151,10 @@ impl Work {
     }
 
     /// Whether rough edges explain more than blurred steps do: a groove that no step
-    /// is, or bays in an edge that were sorted out as grains.
-    pub(super) fn explains_more(&self, fits: &[RoughFit; 2]) -> bool {
-        if self.is_lopsided() && self.is_elsewhere() || self.are_parts_of_flanks(fits) {
+    /// is, bays in an edge that were sorted out as grains, or edges that no blurred step fits and
+    /// whose rows show their course better than lines do.
+    pub(super) fn explains_more(&self, fits: &[RoughFit; 2], found: &WidthMeasurement) -> bool {
+        if self.are_uneven(LOPSIDED) && self.is_elsewhere() || self.are_parts_of_flanks(fits) {
             return true;
         }
         if self.is_wider(fits) || self.is_elsewhere() && self.is_fainter(fits) {
@@ -146,7 +167,8 @@ impl Work {
         if self.is_refined() {
             let has_grains = fits.iter().any(has_grains);
             let grooved = hidden || fits.iter().any(|fit| fit.is_groove);
-            grooved && !has_grains && (two_levels || !self.is_lost)
+            let is_rough = two_levels && self.are_same() && self.are_surer(fits, found);
+            !has_grains && (is_rough || grooved && (two_levels || !self.is_lost))
         } else {
             // Grains here and there look like a groove in the mean over the gauge.
             let is_covered = self.left.is_covered() || self.right.is_covered();

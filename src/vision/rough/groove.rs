@@ -264,7 +264,8 @@ pub fn fit(mean: &MeanProfile, known: &Known<'_>) -> Option<EdgeShape> {
             [sigmas[0], APART_PX2, sigmas[2], sigmas[3], bead, sigmas[5], APART_PX2, sigmas[7]];
         let problem = Problem { prior: step, sigmas, ..groove };
         let step = problem.descend(problem.solve(&step)?)?;
-        let dip = groove.solve(&narrow).and_then(|start| groove.descend(start));
+        let before = known.before.map(|shape| shape.model).filter(Model::is_dip);
+        let dip = groove.descend_from([Some(narrow), before]);
         let dip = dip.filter(|dip| dip.model.is_dip());
         let step_shape = groove.judge(&step, 0.0);
         let Some(dip) = dip else { return step_shape };
@@ -285,9 +286,7 @@ pub fn fit(mean: &MeanProfile, known: &Known<'_>) -> Option<EdgeShape> {
         Some(shape) => [Some(shape.model), None],
         None => [Some(narrow), Some(wide(mean, narrow, last))],
     };
-    let solved = starts.into_iter().flatten().filter_map(|start| groove.solve(&start));
-    let nearest = solved.min_by(|one, other| one.cost.total_cmp(&other.cost))?;
-    groove.judge(&groove.descend(nearest)?, 1.0)
+    groove.judge(&groove.descend_from(starts)?, 1.0)
 }
 
 /// The same groove as wide as the grey that is missing up to a place.
@@ -334,6 +333,12 @@ impl Problem<'_> {
         }
         let solved = normal.solve()?;
         Some(Fitted { model: *model, squares, cost: squares + held, solved })
+    }
+
+    /// The least squares from the start on that fits best.
+    fn descend_from(&self, starts: [Option<Model>; 2]) -> Option<Fitted> {
+        let solved = starts.into_iter().flatten().filter_map(|start| self.solve(&start));
+        self.descend(solved.min_by(|one, other| one.cost.total_cmp(&other.cost))?)
     }
 
     /// The least squares from a start on: Gauss–Newton, with steps that are halved until
