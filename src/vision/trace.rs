@@ -187,6 +187,11 @@ impl Tracer {
         used / float(self.edges.len().max(1))
     }
 
+    /// Share of the rows that surely show something else than the edge.
+    pub fn unfit(&self) -> f64 {
+        self.unfit
+    }
+
     /// Mean of the edges' places across the bead \[px\].
     pub fn middle(&self) -> f64 {
         middle(&self.edges)
@@ -247,7 +252,7 @@ impl Tracer {
         self.path.clear();
         self.state = State::Unseen;
         self.misfit = f64::INFINITY;
-        self.sort_rows = false;
+        (self.sort_rows, self.unfit) = (false, 0.0);
         (self.winds, self.winding) = (false, 0.0);
         self.clear.clear();
         self.picked.clear();

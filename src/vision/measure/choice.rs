@@ -12,6 +12,8 @@ use crate::vision::width::WidthMeasurement;
 
 /// Share of an edge's rows that may be sorted out: more are bays, or grains.
 const FEW_GAPS: f64 = 0.06;
+/// The same of rows that noise does not explain: a single bay of 2 px in 200 rows.
+const FEW_UNFIT: f64 = 0.01;
 /// Narrowest bead whose level is read free of its flanks by rough edges \[px\].
 const NARROW_PX: f32 = 40.0;
 /// Contrast of a rough edge over that of the blurred step below which it is another edge:
@@ -73,9 +75,11 @@ impl Work {
         self.left.blur_px.max(self.right.blur_px) > WIDE_PX
     }
 
-    /// Whether more than a few places of an edge were sorted out.
+    /// Whether more than a few places of an edge were sorted out, or some that surely show
+    /// something else.
     pub(super) fn has_gaps(&self) -> bool {
-        self.left.used_share().min(self.right.used_share()) < 1.0 - FEW_GAPS
+        let used = self.left.used_share().min(self.right.used_share());
+        used < 1.0 - FEW_GAPS || self.left.unfit().max(self.right.unfit()) > FEW_UNFIT
     }
 
     /// Whether rough edges are not higher than the blurred steps: then what was sorted
