@@ -126,16 +126,16 @@ impl Work {
         left.min(right) < share * left.max(right)
     }
 
-    /// Whether rough edges lie elsewhere than the blurred steps.
-    fn is_elsewhere(&self) -> bool {
+    /// How far rough edges lie from where edges were located before \[px\]: the farther of both.
+    fn apart_px(&self) -> f64 {
         let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
-        sides.iter().any(|(steps, rough)| (steps.middle() - rough.middle()).abs() > ELSEWHERE_PX)
+        let apart = sides.map(|(found, rough)| (found.middle() - rough.middle()).abs());
+        apart[0].max(apart[1])
     }
 
-    /// Whether rough edges lie where edges were located line by line.
-    fn are_same(&self) -> bool {
-        let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
-        sides.iter().all(|(lines, rough)| (lines.middle() - rough.middle()).abs() < SAME_PX)
+    /// Whether rough edges lie elsewhere than the blurred steps.
+    fn is_elsewhere(&self) -> bool {
+        self.apart_px() > ELSEWHERE_PX
     }
 
     /// Whether the width between rough edges is surer than the one that was found.
@@ -171,7 +171,7 @@ impl Work {
         if self.is_refined() {
             let has_grains = fits.iter().any(has_grains);
             let grooved = hidden || fits.iter().any(|fit| fit.is_groove);
-            let is_rough = two_levels && self.are_same() && self.are_surer(fits, found);
+            let is_rough = two_levels && self.apart_px() < SAME_PX && self.are_surer(fits, found);
             !has_grains && (is_rough || grooved && (two_levels || !self.is_lost))
         } else {
             // Grains here and there look like a groove in the mean over the gauge.
