@@ -351,11 +351,17 @@ impl Tracer {
         self.shape = Some(self.adopt(shape));
     }
 
-    /// What lies beside the edge whose shape was read, with the levels that were picked for
-    /// it \[grey levels\].
-    pub fn surroundings(&mut self) -> Option<Surroundings<'_>> {
+    /// The levels that were picked before and after the edge: means over the bands
+    /// \[grey levels\].
+    pub fn levels(&self) -> [f64; 2] {
         let [before, step] = [&self.before, &self.step].map(|values| f64::from(typical(values)));
-        Some(Surroundings { shape: self.shape.as_mut()?, before, step })
+        [before, before + step]
+    }
+
+    /// What lies beside the edge whose shape was read.
+    pub fn surroundings(&mut self) -> Option<Surroundings<'_>> {
+        let [before, after] = self.levels();
+        Some(Surroundings { shape: self.shape.as_mut()?, before, step: after - before })
     }
 
     /// Locates the edge whose shape was read; `blur` as there.

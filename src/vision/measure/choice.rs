@@ -26,10 +26,11 @@ const ELSEWHERE_PX: f64 = 3.0;
 /// The distance of a rough edge from what was located line by line up to which both are the
 /// same \[px\].
 const SAME_PX: f64 = 0.25;
-/// Contrast of an edge as a fraction of the other's below which something else lies beside it
-/// than beside the other, so that a narrow groove may: one of 2 to 2.5 px that is a little
-/// darker than the ground moves a blurred step by a third of a pixel and shows in nothing else.
-const UNEVEN: f64 = 0.9;
+/// By how much the levels outside the two edges differ, as a share of the higher contrast,
+/// where something else lies beside one than beside the other, so that a narrow groove may: one
+/// of 2 to 2.5 px that is a little darker than the ground moves a blurred step by a third of a
+/// pixel and shows in nothing else.
+const TWO_GROUNDS: f64 = 0.1;
 /// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a
 /// wide flank.
 const PART_OF_FLANK: f64 = 0.5;
@@ -62,7 +63,7 @@ impl Work {
             return false;
         }
         let is_other = self.is_refined() || self.is_beside_groove || self.is_wide();
-        is_other || self.has_gaps() || self.are_uneven(UNEVEN)
+        is_other || self.has_gaps() || self.has_two_grounds()
     }
 
     /// Whether edges were located line by line.
@@ -120,10 +121,17 @@ impl Work {
         Ok(())
     }
 
-    /// Whether one edge has less than a share of the other's contrast.
-    fn are_uneven(&self, share: f64) -> bool {
+    /// Whether one edge has much less contrast than the other.
+    fn are_lopsided(&self) -> bool {
         let [left, right] = self.contrasts;
-        left.min(right) < share * left.max(right)
+        left.min(right) < LOPSIDED * left.max(right)
+    }
+
+    /// Whether something else lies outside the one edge than outside the other.
+    fn has_two_grounds(&self) -> bool {
+        let ([left, _], [_, right]) = (self.left.levels(), self.right.levels());
+        let [one, other] = self.contrasts;
+        (left - right).abs() > TWO_GROUNDS * one.max(other)
     }
 
     /// How far rough edges lie from where edges were located before \[px\]: the farther of both.
@@ -158,7 +166,7 @@ impl Work {
     /// is, bays in an edge that were sorted out as grains, or edges that no blurred step fits and
     /// whose rows show their course better than lines do.
     pub(super) fn explains_more(&self, fits: &[RoughFit; 2], found: &WidthMeasurement) -> bool {
-        if self.are_uneven(LOPSIDED) && self.is_elsewhere() || self.are_parts_of_flanks(fits) {
+        if self.are_lopsided() && self.is_elsewhere() || self.are_parts_of_flanks(fits) {
             return true;
         }
         if self.is_wider(fits) || self.is_elsewhere() && self.is_fainter(fits) {
