@@ -322,6 +322,7 @@ impl Work {
                 return self.take_rough(&fits, strip, view, surface);
             }
             self.check_flanks(&fits)?;
+            return Ok(self.at_least_as_unsure(&fits, found));
         }
         Ok(found)
     }

@@ -48,13 +48,13 @@ const SAME_BLUR: f64 = 0.02;
 const FINE_FRACTION: f64 = 0.2;
 
 /// How likely a groove that does not show its depth must be to be looked at.
-const LIKELY_GROOVE: f64 = 0.18;
+const LIKELY_GROOVE: f64 = 0.1;
 
 /// Standard deviation of the place of an edge beside a groove that hides its depth that its
 /// waves leave open, as a fraction of theirs and at most \[px\]: the mean over them is no Gaussian
 /// flank. Measured on 12,000 rendered beads.
-const GROOVE_WAVES: f64 = 0.1;
-const MOST_GROOVE_WAVES_PX: f64 = 0.1;
+const GROOVE_WAVES: f64 = 0.15;
+const MOST_GROOVE_WAVES_PX: f64 = 0.15;
 
 /// Standard deviation, beside that of noise, of where rows pass half height as the edge beside
 /// a groove \[px\]: its floor may be hidden, and torn edges have no Gaussian flank. Averaged

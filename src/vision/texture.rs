@@ -8,8 +8,9 @@ use super::number::float;
 use super::overlay::Overlay;
 
 /// Variance of the rows about an edge, in that of their noise, from which on
-/// they are looked at for texture.
-const NOTABLE: f64 = 1.25;
+/// they are looked at for texture: noise alone, in 100 rows, has less in all but one of
+/// a hundred.
+const NOTABLE: f64 = 1.12;
 /// Rows differ more about the edge than beside it where the edge is no blurred
 /// step or does not lie where it is thought; by more than so many times, and it
 /// is not texture that makes them differ.
@@ -19,6 +20,8 @@ const LEAST: f64 = 0.1;
 /// Longest texture \[px\]: what changes more slowly is light, or the bead's
 /// shape, which the levels of the caliper lines follow.
 const LONGEST_PX: f64 = 11.0;
+/// Variance of the texture on one side over that on the other below which they differ.
+const ONE_SIDE: f64 = 0.25;
 /// Samples beyond so many standard deviations are grains and sparks.
 const MANY_SIGMA: f64 = 4.0;
 /// Rows that differ by so many medians of what rows do have one on them.
@@ -56,6 +59,8 @@ pub struct Texture {
     /// their mean.
     rows: f64,
     kept: f64,
+    /// Standard deviations before and after the edge, over the root of their mean square.
+    sides: [f64; 2],
 }
 
 impl Texture {
@@ -81,7 +86,8 @@ impl Texture {
         noise: f64,
         beside: [(usize, usize); 2],
     ) -> Option<Self> {
-        let all = covariances(overlay, beside, MANY_SIGMA * (about_edge / rows).sqrt())?;
+        let Covariances { all, sides } =
+            covariances(overlay, beside, MANY_SIGMA * (about_edge / rows).sqrt())?;
         if rows * all[0] < (1.0 + LEAST) * noise || about_edge > AT_EDGE * rows * all[0] {
             return None;
         }
@@ -92,7 +98,8 @@ impl Texture {
         // What neighbouring rows differ by, as noise is found, has a little of
         // the texture in it.
         let noise = (rows * (all[0] - kept * variance)).clamp(0.25 * noise, 1.1 * noise);
-        let texture = Self { noise, variance, length, power, rows, kept };
+        let sides = sides.map(|side| side.map(|all| (rows * all - noise).max(0.0)));
+        let texture = Self { noise, variance, length, power, rows, kept, sides: shares(sides) };
         (rows * kept * variance > LEAST * noise).then_some(texture)
     }
 
@@ -110,6 +117,13 @@ impl Texture {
     /// Variance of the noise in it.
     pub fn noise_of_window(&self) -> f64 {
         self.noise / self.rows
+    }
+
+    /// Standard deviation where a share of the edge's step is reached, over the root of its
+    /// mean square before and after the edge.
+    pub fn beside(&self, step: f64) -> f64 {
+        let [before, after] = self.sides;
+        before * (1.0 - step) + after * step
     }
 
     /// Covariance of pixels of the same window at a distance \[px\], without
@@ -141,18 +155,36 @@ impl Texture {
     }
 }
 
-/// Covariances of samples of a row at distances of 0 to [`LAGS`] pixels, over
-/// all rows but those with a grain; `None` where there is too little room.
-fn covariances(
-    overlay: &Overlay,
-    beside: [(usize, usize); 2],
-    limit: f64,
-) -> Option<[f64; LAGS + 1]> {
+/// Covariances of samples of a row at distances of 0 to [`LAGS`] pixels.
+struct Covariances {
+    /// On both sides.
+    all: [f64; LAGS + 1],
+    /// Variances before the edge and after it, where there is room.
+    sides: [Option<f64>; 2],
+}
+
+/// Standard deviations before and after the edge, over the root of their mean square, from
+/// variances: weights for the same texture on both sides believe that what they see on the one
+/// tells them of the other.
+fn shares(sides: [Option<f64>; 2]) -> [f64; 2] {
+    match sides {
+        [Some(before), Some(after)] if before.min(after) < ONE_SIDE * before.max(after) => {
+            let mean = f64::midpoint(before, after);
+            [before, after].map(|side| (side / mean).sqrt())
+        }
+        _ => [1.0; 2],
+    }
+}
+
+/// Covariances over all rows but those with a grain; `None` where there is too little room.
+fn covariances(overlay: &Overlay, beside: [(usize, usize); 2], limit: f64) -> Option<Covariances> {
     let mut sums = [0.0; LAGS + 1];
     let mut counts = [0.0; LAGS + 1];
+    let mut sides = [None; 2];
     #[expect(clippy::cast_possible_truncation, reason = "a share of a step")]
     let limit = limit as f32;
-    for (before, (near, far)) in [true, false].into_iter().zip(beside) {
+    for (side, (near, far)) in beside.into_iter().enumerate() {
+        let (sum_before, count_before) = (sums[0], counts[0]);
         let length = far.saturating_sub(near).min(MOST_ROOM);
         if length < LEAST_ROOM {
             continue;
@@ -160,7 +192,7 @@ fn covariances(
         let mut off = [0.0f32; MOST_ROOM];
         for (row, mean) in overlay.rows_like_others(UNLIKE) {
             let centre = row.len() / 2;
-            let first = if before { centre - near - length } else { centre + near };
+            let first = if side == 0 { centre - near - length } else { centre + near };
             let both = row[first..first + length].iter().zip(&mean[first..first + length]);
             for (off, (sample, mean)) in off.iter_mut().zip(both) {
                 *off = (sample - mean).clamp(-limit, limit);
@@ -170,6 +202,7 @@ fn covariances(
                 *count += float(length - lag);
             }
         }
+        sides[side] = Some((sums[0] - sum_before) / (counts[0] - count_before).max(1.0));
     }
     if counts[0] == 0.0 {
         return None;
@@ -180,7 +213,7 @@ fn covariances(
     for (sum, count) in sums.iter_mut().zip(counts) {
         *sum *= share / count;
     }
-    Some(sums)
+    Some(Covariances { all: sums, sides: sides.map(|side| side.map(|sum: f64| share * sum)) })
 }
 
 #[inline(always)]
@@ -339,9 +372,25 @@ mod tests {
     }
 
     #[test]
+    fn a_texture_is_one_sides_where_the_other_has_hardly_any() {
+        assert_eq!(shares([Some(3.0), Some(5.0)]), [1.0; 2]);
+        assert_eq!(shares([None, Some(5.0)]), [1.0; 2]);
+        let [before, after] = shares([Some(0.0), Some(5.0)]);
+        assert_eq!(before, 0.0);
+        assert!((after * after - 2.0).abs() < 1e-12, "{after}");
+    }
+
+    #[test]
     fn sums_along_the_edge_are_those_of_a_gaussian() {
-        let texture =
-            Texture { noise: 1.0, variance: 4.0, length: 4.0, power: 4, rows: 1.0, kept: 1.0 };
+        let texture = Texture {
+            noise: 1.0,
+            variance: 4.0,
+            length: 4.0,
+            power: 4,
+            rows: 1.0,
+            kept: 1.0,
+            sides: [1.0; 2],
+        };
         for distance in [0.0, 1.3, 5.0, 60.0] {
             let expected =
                 16.0 * std::f64::consts::PI.sqrt() * libm::exp(-distance * distance / 16.0);

@@ -146,10 +146,29 @@ impl Work {
         self.apart_px() > ELSEWHERE_PX
     }
 
-    /// Whether the width between rough edges is surer than the one that was found.
-    fn are_surer(&self, fits: &[RoughFit; 2], found: &WidthMeasurement) -> bool {
-        let sigma_px = found.sigma.get() / self.mm_per_px;
-        fits.iter().map(|fit| fit.variance).sum::<f64>() < sigma_px * sigma_px
+    /// Standard deviation of the width between rough edges in that of the one that was found:
+    /// less than 1 where it is surer.
+    fn sigma_share(&self, fits: &[RoughFit; 2], found: &WidthMeasurement) -> f64 {
+        let rough_px = fits.iter().map(|fit| fit.variance).sum::<f64>().sqrt();
+        rough_px * self.mm_per_px / found.sigma.get()
+    }
+
+    /// A width between blurred steps; where rows were sorted out and neither grains nor
+    /// sparks are seen, as unsure as all rows say it is: those that are left were
+    /// chosen, as from a texture that was not told.
+    pub(super) fn at_least_as_unsure(
+        &self,
+        fits: &[RoughFit; 2],
+        found: WidthMeasurement,
+    ) -> WidthMeasurement {
+        let is_plain = fits.iter().all(|fit| fit.odd_share < GRAINS);
+        let has_room = self.width_px > NARROW_PX;
+        let share = if has_room && is_plain && self.has_gaps() {
+            self.sigma_share(fits, &found).max(1.0)
+        } else {
+            1.0
+        };
+        WidthMeasurement { sigma: found.sigma * share, ..found }
     }
 
     /// Whether a rough edge lies farther out than its blurred step, with no narrow
@@ -179,7 +198,8 @@ impl Work {
         if self.is_refined() {
             let has_grains = fits.iter().any(has_grains);
             let grooved = hidden || fits.iter().any(|fit| fit.is_groove);
-            let is_rough = two_levels && self.apart_px() < SAME_PX && self.are_surer(fits, found);
+            let is_rough =
+                two_levels && self.apart_px() < SAME_PX && self.sigma_share(fits, found) < 1.0;
             !has_grains && (is_rough || grooved && (two_levels || !self.is_lost))
         } else {
             // Grains here and there look like a groove in the mean over the gauge.

@@ -2,9 +2,10 @@
 
 use super::choice::has_grains;
 use super::judge::{WHOLE_SHARE, place};
+use super::rough::in_texture;
 use super::{NEED_SHARE, Work, even};
 use crate::calib::SurfaceMap;
-use crate::vision::coarse::LinePair;
+use crate::vision::coarse::{LinePair, StepLine};
 use crate::vision::ground::{Place, Side};
 use crate::vision::mean_edge::{BLURS_PX, Scene};
 use crate::vision::number::float;
@@ -30,6 +31,10 @@ pub(super) const STRONGEST_BESIDE_WHOLE: f64 = 0.25;
 const NOTABLE: f64 = 0.06;
 /// The same of the bead's texture: sparks over 5 % of a smooth bead look like up to 0.12.
 const NOTABLE_TEXTURE: f64 = 0.13;
+/// The least of both edges' as a fraction of the other's where it is the same texture.
+const ALIKE: f64 = 0.4;
+/// The same half-way between two lines, as a share of it.
+const HALF_WAY: f32 = 0.5;
 /// Blur beyond which a bead's texture is free of a flank that is not known yet \[px\].
 const LARGE_BLUR_PX: f64 = 3.0;
 /// Blur of a mean profile up to which its variance is what texture and pattern leave open
@@ -79,6 +84,7 @@ impl Work {
         if fits.iter().any(has_grains) {
             return None;
         }
+        let fits = in_texture(&pair, fits);
         Some(self.take_rough_beside(pattern, true, &fits, strip, view, surface))
     }
 
@@ -93,12 +99,13 @@ impl Work {
         view: &View,
         surface: &SurfaceMap,
     ) -> Option<Result<WidthMeasurement, Reject>> {
-        let is_textured = self.is_textured_between_steps(strip);
+        let shares = self.texture_between_steps(strip);
+        let is_textured = rms(shares) > NOTABLE_TEXTURE;
         if !is_textured && self.pattern_share == 0.0 {
             return None;
         }
         let Ok(pair) = self.find_lines(strip, range) else {
-            return self.check_whole(is_textured).err().map(Err);
+            return self.check_whole(is_textured && are_alike(shares)).err().map(Err);
         };
         let pattern = self.ground_pattern(strip, &pair);
         let contrast = self.contrasts[0].min(self.contrasts[1]);
@@ -125,8 +132,9 @@ impl Work {
         if !is_textured && got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
-    /// Whether the bead between two blurred steps has a texture, from that beside both.
-    fn is_textured_between_steps<T: Grey>(&mut self, strip: &Strip<'_, T>) -> bool {
+    /// Standard deviation of the bead's texture beside either of two blurred steps, as a
+    /// fraction of its contrast.
+    fn texture_between_steps<T: Grey>(&mut self, strip: &Strip<'_, T>) -> [f64; 2] {
         let sides = [(&self.left, 1.0), (&self.right, -1.0)];
         let room_px = self.right.middle() - self.left.middle();
         let mut shares = [0.0; 2];
@@ -139,32 +147,50 @@ impl Work {
             let texture = self.ground.texture(strip, &side, self.noise.grey.into());
             *share = texture.unwrap_or(0.0) / contrast;
         }
-        (0.5 * (shares[0] * shares[0] + shares[1] * shares[1])).sqrt() > NOTABLE_TEXTURE
+        shares
     }
 
-    /// Whether it has one beside both of two lines: one of them may lie on the ground.
+    /// Whether it has one beside both of two lines, and half-way between them: lines in the
+    /// ground's pattern have that beside them, and a plain bead between.
     pub(super) fn is_textured_between_lines<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
         pair: &LinePair,
     ) -> bool {
+        let [left, right] = pair.sides;
+        let middle = StepLine {
+            at: f32::midpoint(left.at, right.at),
+            slope: f32::midpoint(left.slope, right.slope),
+            step: HALF_WAY * left.step.min(right.step),
+        };
+        let width_px = pair.width_px();
+        [(left, 1.0), (right, -1.0), (middle, 1.0), (middle, -1.0)]
+            .iter()
+            .all(|(line, inwards)| self.is_textured_beside(strip, line, *inwards, width_px))
+    }
+
+    /// Whether a texture shows on one side of a line that is strong for its step.
+    fn is_textured_beside<T: Grey>(
+        &mut self,
+        strip: &Strip<'_, T>,
+        line: &StepLine,
+        inwards: f64,
+        width_px: f32,
+    ) -> bool {
         let middle = 0.5 * (float(strip.along) - 1.0);
-        let noise = f64::from(self.noise.grey);
-        pair.sides.iter().zip([1.0, -1.0]).all(|(line, inwards)| {
-            self.places.clear();
-            self.places.extend(self.lines.iter().map(|&rows| {
-                let off = pool::middle(rows) - middle;
-                Place { rows, at: f64::from(line.at) + off * f64::from(line.slope) }
-            }));
-            let side = Side {
-                places: &self.places,
-                outwards: inwards,
-                blur_px: LARGE_BLUR_PX,
-                room_px: pair.width_px().into(),
-            };
-            let texture = self.ground.texture(strip, &side, noise);
-            texture.is_some_and(|texture| texture > NOTABLE_TEXTURE * f64::from(line.step))
-        })
+        self.places.clear();
+        self.places.extend(self.lines.iter().map(|&rows| {
+            let off = pool::middle(rows) - middle;
+            Place { rows, at: f64::from(line.at) + off * f64::from(line.slope) }
+        }));
+        let side = Side {
+            places: &self.places,
+            outwards: inwards,
+            blur_px: LARGE_BLUR_PX,
+            room_px: width_px.into(),
+        };
+        let texture = self.ground.texture(strip, &side, self.noise.grey.into());
+        texture.is_some_and(|texture| texture > NOTABLE_TEXTURE * f64::from(line.step))
     }
 
     /// Measures a bead whose ground has a pattern of such a standard deviation
@@ -213,7 +239,7 @@ impl Work {
         }
         // An edge beside a strong pattern is drawn to its bright places.
         let beside = ground * (1.0 + (got / STRONGEST).powi(4)) + bead;
-        let variance = beside * (blur_px / SURE_BLUR_PX).max(1.0);
+        let variance = beside * doubt_of_blur(blur_px);
         let fits = [one, other].map(|fit| fit.as_rough(blur_px, variance));
         even::check(&fits, even::middle_grey(strip, pair))?;
         self.left_px.clear();
@@ -227,11 +253,27 @@ impl Work {
     }
 }
 
+/// Root of the mean square of the shares of both sides.
+fn rms([left, right]: [f64; 2]) -> f64 {
+    f64::midpoint(left * left, right * right).sqrt()
+}
+
+/// Whether a bead has the same texture beside both edges: one of them may lie in the ground's
+/// pattern.
+fn are_alike([left, right]: [f64; 2]) -> bool {
+    left.min(right) >= ALIKE * left.max(right)
+}
+
 /// Refuses a bead whose ground has a pattern, a fraction of the contrast, and whose mean
 /// profile tells no edges: parts of the pattern look like bead, and like grooves.
 pub(super) fn check_pattern(got: f64, is_textured: bool) -> Result<(), Reject> {
     let limit = if is_textured { STRONGEST_OF_SAME } else { STRONGEST_BESIDE_PLAIN };
     if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
+}
+
+/// By how much the variance of an edge of a textured bead grows with its blur.
+pub(super) fn doubt_of_blur(blur_px: f64) -> f64 {
+    (blur_px / SURE_BLUR_PX).max(1.0)
 }
 
 /// Where an edge lies on all caliper lines: where it is not located, between those beside it.

@@ -1,6 +1,6 @@
 //! Beads whose edges are no blurred steps: torn ones, grooves, texture.
 
-use super::patterned::check_pattern;
+use super::patterned::{check_pattern, doubt_of_blur};
 use super::{NEED_SHARE, Work, even};
 use crate::calib::SurfaceMap;
 use crate::vision::coarse::{LinePair, StepLine};
@@ -21,6 +21,11 @@ const LINE_SLACK: f32 = 1.4;
 /// Widest blur of a rough edge \[px\]: what lies outside is looked for within 20 px, and
 /// a flank of three blurs must end before.
 pub const WIDEST_ROUGH_PX: f64 = 6.3;
+/// Blur up to which the level outside is read free of the flank \[px\], and by how much an edge
+/// may be off for each pixel that it exceeds it: drawn edges of 5.7 to 6 px, by motion, lay 0.45 px
+/// too far out.
+const WHOLE_FLANK_PX: f64 = 5.0;
+const OFF_PER_BLUR: f64 = 0.5;
 /// Part of the width beside either edge where its flank may be \[of the width\]: the
 /// bead's texture is taken from between.
 const TEXTURE_MARGIN: f32 = 0.15;
@@ -56,6 +61,7 @@ impl Work {
         if is_covered(refused) && self.may_be_grains(refused, &fits) {
             return Err(*refused);
         }
+        let fits = if is_textured { in_texture(&pair, fits) } else { fits };
         self.take_rough_beside(pattern, is_textured, &fits, strip, view, surface)
     }
 
@@ -179,15 +185,16 @@ impl Work {
     /// The width of the bead whose rough edges were found.
     pub(super) fn take_rough<T: Grey>(
         &mut self,
-        [left_fit, right_fit]: &[RoughFit; 2],
+        fits: &[RoughFit; 2],
         strip: &Strip<'_, T>,
         view: &View,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
         self.left_px.clear();
         self.right_px.clear();
-        self.left.take_rough(self.rough[0].lines(), left_fit);
-        self.right.take_rough(self.rough[1].lines(), right_fit);
+        let [left, right] = fits.map(with_flank);
+        self.left.take_rough(self.rough[0].lines(), &left);
+        self.right.take_rough(self.rough[1].lines(), &right);
         self.check_contrast()?;
         self.check_blur(WIDEST_ROUGH_PX)?;
         self.check_ground(strip, f64::min)?;
@@ -212,6 +219,21 @@ impl Work {
         let rival = self.pairs.iter().skip(1).find(|other| self.coarse.are_rivals(pair, other));
         rival.map_or(Ok(()), |rival| Err(self.ambiguous(pair.width_px(), rival.width_px())))
     }
+}
+
+/// An edge with the doubt that a flank leaves which is not seen whole.
+fn with_flank(fit: RoughFit) -> RoughFit {
+    let off_px = OFF_PER_BLUR * (fit.blur_px - WHOLE_FLANK_PX).max(0.0);
+    RoughFit { variance: fit.variance + off_px * off_px, ..fit }
+}
+
+/// Edges of a textured bead whose mean profile shows none: without a groove beside it, dark
+/// places of the bead pass for a part of a flank that is too wide.
+pub(super) fn in_texture(pair: &LinePair, fits: [RoughFit; 2]) -> [RoughFit; 2] {
+    if pair.has_groove() {
+        return fits;
+    }
+    fits.map(|fit| RoughFit { variance: fit.variance * doubt_of_blur(fit.blur_px), ..fit })
 }
 
 /// Whether a frame was refused for what hides its edges, which may be grains.

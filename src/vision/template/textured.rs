@@ -22,10 +22,12 @@ impl Template {
     /// that cannot be done: then the template has to be made anew.
     pub fn whiten(&mut self, whitener: &mut Whitener, texture: &Texture) -> Option<Scatter> {
         let (first, count) = self.counting()?;
-        let own = |distance: usize| if distance == 0 { texture.noise } else { 0.0 };
-        if !whitener.prepare(count, |d| own(d) + texture.over_rows(float(d))) {
+        let covariances: [f64; MOST] = std::array::from_fn(|d| texture.over_rows(float(d)));
+        let noise = |distance: usize| if distance == 0 { texture.noise } else { 0.0 };
+        if !whitener.prepare(count, |d| noise(d) + covariances[d]) {
             return None;
         }
+        let beside = self.texture_beside(first, texture);
         let mut scatter = Scatter { of_mean: 0.0, of_window: 0.0 };
         for phase in 0..PHASES {
             let parts = &mut self.parts[phase * MAX_CHUNKS..][..self.chunks];
@@ -35,7 +37,9 @@ impl Template {
                 slope[k] = part.slope[lane].into();
                 after[k] = part.after[lane].into();
             }
-            scatter.of_mean += whitener.weights(&mut slope, &after)? / float(PHASES);
+            whitener.weights(&mut slope, &after)?;
+            let weights = Weights::of(&slope[..count], &beside);
+            scatter.of_mean += weights.variance(texture.noise, |d| covariances[d]) / float(PHASES);
             for part in parts.iter_mut() {
                 (part.slope, part.mask) = ([0.0; LANES], [0.0; LANES]);
             }
@@ -47,13 +51,24 @@ impl Template {
                 part.slope[lane] = weight;
             }
             if phase == 0 {
-                scatter.of_window = of_window(&slope[..count], texture);
+                let within = |distance| texture.within_window(float(distance));
+                scatter.of_window = weights.variance(texture.noise_of_window(), within);
             }
         }
         self.products.slope_slope = 1.0;
         self.products.slope_before = 0.0;
         self.products.slope_after = 0.0;
         Some(scatter)
+    }
+
+    /// Shares of the texture that the pixels have from the first one that counts on: where the
+    /// phases' edges lie differs by less than texture hangs together.
+    fn texture_beside(&self, first: usize, texture: &Texture) -> [f64; MOST] {
+        let parts = &self.parts[PHASES / 2 * MAX_CHUNKS..][..self.chunks];
+        std::array::from_fn(|k| {
+            let (part, lane) = ((first + k) / LANES, (first + k) % LANES);
+            parts.get(part).map_or(0.0, |part| texture.beside(part.after[lane].into()))
+        })
     }
 
     /// Number of the first pixel that counts in every phase, and of how many
@@ -71,13 +86,57 @@ impl Template {
     }
 }
 
-fn of_window(weights: &[f64], texture: &Texture) -> f64 {
-    let mut sum = 0.0;
-    for distance in 0..weights.len() {
-        let product: f64 = weights.iter().zip(&weights[distance..]).map(|(a, b)| a * b).sum();
-        let covariance = texture.within_window(float(distance));
-        let noise = texture.noise_of_window();
-        sum += product * if distance == 0 { covariance + noise } else { 2.0 * covariance };
+/// Weights of pixels.
+struct Weights {
+    /// Sum of their squares.
+    square: f64,
+    /// The same weights times the texture's share at each pixel.
+    textured: [f64; MOST],
+    count: usize,
+}
+
+impl Weights {
+    fn of(weights: &[f64], beside: &[f64; MOST]) -> Self {
+        let square = weights.iter().map(|weight| weight * weight).sum();
+        let mut textured = [0.0; MOST];
+        for (product, (weight, share)) in textured.iter_mut().zip(weights.iter().zip(beside)) {
+            *product = weight * share;
+        }
+        Self { square, textured, count: weights.len() }
     }
-    sum
+
+    /// Variance of what they make of pixels with a noise of such a variance and a texture with
+    /// such covariances by distance \[px\].
+    fn variance(&self, noise: f64, covariance: impl Fn(usize) -> f64) -> f64 {
+        let textured = &self.textured[..self.count];
+        (0..self.count).fold(noise * self.square, |sum, distance| {
+            let pairs = textured.iter().zip(&textured[distance..]);
+            let product: f64 = pairs.map(|(a, b)| a * b).sum();
+            let times = if distance == 0 { 1.0 } else { 2.0 };
+            sum + times * product * covariance(distance)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texture_of_one_side_counts_where_it_is() {
+        let weights = [1.0, -2.0, 0.5, 3.0, -1.0];
+        let mut beside = [0.0; MOST];
+        beside[..5].copy_from_slice(&[0.0, 0.1, 0.7, 1.3, 1.4]);
+        let covariance = |distance: usize| 4.0 * libm::exp(-float(distance * distance) / 9.0);
+        let mut expected = 0.0;
+        for i in 0..5 {
+            for j in 0..5 {
+                let noise = if i == j { 0.3 } else { 0.0 };
+                let texture = beside[i] * beside[j] * covariance(i.abs_diff(j));
+                expected += weights[i] * weights[j] * (noise + texture);
+            }
+        }
+        let got = Weights::of(&weights, &beside).variance(0.3, covariance);
+        assert!((got - expected).abs() < 1e-12, "{got} {expected}");
+    }
 }
