@@ -163,7 +163,8 @@ impl Work {
     ) -> WidthMeasurement {
         let is_plain = fits.iter().all(|fit| fit.odd_share < GRAINS);
         let has_room = self.width_px > NARROW_PX;
-        let share = if has_room && is_plain && self.has_gaps() {
+        let is_chosen = self.way == Way::Steps && self.has_gaps();
+        let share = if is_chosen && has_room && is_plain {
             self.sigma_share(fits, &found).max(1.0)
         } else {
             1.0
