@@ -47,11 +47,10 @@ const UNKNOWN_BLUR: Blur = Blur { px: 1.8, variance: 1.0 };
 const SAME_BLUR: f64 = 0.02;
 const FINE_FRACTION: f64 = 0.2;
 
-/// How likely a groove that does not show its depth must be for its shape to weigh in, and to
-/// be one that blurred steps do not tell: with 0.1 for both, so many plain beads were measured as
-/// grooved ones that their error grew by 3 %.
-const POSSIBLE_GROOVE: f64 = 0.1;
+/// How likely a groove that does not show its depth must be to be looked at, and for it to be
+/// doubted that there is none.
 const LIKELY_GROOVE: f64 = 0.18;
+const POSSIBLE_GROOVE: f64 = 0.1;
 
 /// Standard deviation of the place of an edge beside a groove that hides its depth that its
 /// waves leave open, as a fraction of theirs and at most \[px\]: the mean over them is no Gaussian
@@ -193,8 +192,7 @@ impl RoughEdge {
         let (bead_grey, hides_depth) = (mean.bead(), mean.filled > 0.0);
         let known = other.filter(|blur| blur.variance < UNKNOWN_BLUR.variance);
         let shape = known.and_then(|blur| self.fit_shape(blur, scene, self.shape)).or(self.shape);
-        let groove_share = shape.map_or(0.0, |shape| shape.groove_share);
-        let is_groove_possible = groove_share > POSSIBLE_GROOVE;
+        let is_groove_likely = shape.is_some_and(|shape| shape.groove_share > LIKELY_GROOVE);
         let noise = noise::of_mean(&self.windows, &self.levels, &self.crossings, scene)?;
         // Where a rib or a shade lies within, only the level beside the edge is the bead's.
         let off = |shape: &EdgeShape| shape.at - float(OUTSIDE) - self.crossings.off_course;
@@ -204,7 +202,7 @@ impl RoughEdge {
             shape.level_off > LEVEL_OFF
                 && off(shape).abs() < MOST_OFF * level * f64::from(INSIDE_PX)
         };
-        let shaped = shape.filter(|shape| is_groove_possible || of_level(shape));
+        let shaped = shape.filter(|shape| is_groove_likely || of_level(shape));
         let of_waves = if hides_depth {
             let waves = noise::roughness(&self.crossings).sqrt();
             (GROOVE_WAVES * waves).min(MOST_GROOVE_WAVES_PX).powi(2)
@@ -220,7 +218,7 @@ impl RoughEdge {
             *at += narrow(shift);
         }
         let of_shape = |shape: EdgeShape| {
-            if is_groove_possible {
+            if is_groove_likely {
                 let (weight, of_groove) = (weight_of(shape), shape.variance + of_waves);
                 let rest = 1.0 - weight;
                 // Both are of the same pixels and read them differently: a correlation of a half.
@@ -229,16 +227,18 @@ impl RoughEdge {
             }
             shape.variance.max(noise.of_mean) + (SHIFT_FRACTION * shift).powi(2)
         };
+        let possible = shape.filter(|shape| shape.groove_share > POSSIBLE_GROOVE);
+        let doubted = possible.map_or(0.0, |shape| shape.variance).max(noise.of_mean);
         self.gather(scene, noise.of_row);
         let seen = self.crossings.at.iter().filter(|at| at.is_finite()).count();
         Some(RoughFit {
-            variance: shaped.map_or(noise.of_mean, of_shape),
+            variance: shaped.map_or(doubted, of_shape),
             rows_fraction: float(seen) / float(self.crossings.at.len()),
             contrast,
             blur_px: noise.blur_px,
             bead_grey,
             is_groove,
-            is_narrow_groove: groove_share > LIKELY_GROOVE,
+            is_narrow_groove: is_groove_likely,
             is_on_ground: on_ground,
             odd_share: noise::mean_of(&self.crossings.odd),
             odd_within_share: noise::mean_of(&self.crossings.odd_within),

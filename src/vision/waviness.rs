@@ -48,7 +48,7 @@ impl Waves {
     fn small_first(self) -> f64 {
         match self {
             Self::Smooth => 0.7,
-            Self::Torn => 1.0,
+            Self::Torn => 0.9,
         }
     }
 

@@ -23,7 +23,7 @@ const STRANGE: f64 = 2.0;
 const VERY_STRANGE: f64 = 8.0;
 /// Largest standard deviation of a width whose edges are covered in part
 /// \[px\]: beyond it, what is left of an edge does not tell its course.
-const COVERED_SIGMA_PX: f64 = 0.19;
+const COVERED_SIGMA_PX: f64 = 0.185;
 /// The same where a covered edge seems to wind: what winds aside looks covered as
 /// well, so that too little is left of such an edge.
 const WINDING_SIGMA_PX: f64 = 0.08;
