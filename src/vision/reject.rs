@@ -148,9 +148,11 @@ impl Reject {
     /// The more telling of the reasons why a frame has neither rough edges, which is
     /// this one, nor smooth ones.
     pub fn or(self, smooth: Self) -> Self {
-        match self {
-            Self::NoPair { .. } => smooth,
-            told => told,
+        match (self, smooth) {
+            (Self::NoPair { .. }, smooth) => smooth,
+            // Two pairs of smooth edges are more than texture that an edge hardly exceeds.
+            (Self::Vague { .. }, Self::Ambiguous { .. }) => smooth,
+            (told, _) => told,
         }
     }
 
