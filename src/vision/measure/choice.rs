@@ -153,9 +153,9 @@ impl Work {
         rough_px * self.mm_per_px / found.sigma.get()
     }
 
-    /// A width between blurred steps; where rows were sorted out and neither grains nor
+    /// A width between blurred steps. Where rows were sorted out and neither grains nor
     /// sparks are seen, as unsure as all rows say it is: those that are left were
-    /// chosen, as from a texture that was not told.
+    /// chosen, as from a texture that was not told. The same beside what may be a narrow groove.
     pub(super) fn at_least_as_unsure(
         &self,
         fits: &[RoughFit; 2],
@@ -163,8 +163,9 @@ impl Work {
     ) -> WidthMeasurement {
         let is_plain = fits.iter().all(|fit| fit.odd_share < GRAINS);
         let has_room = self.width_px > NARROW_PX;
-        let is_chosen = self.way == Way::Steps && self.has_gaps();
-        let share = if is_chosen && has_room && is_plain {
+        let may_be_grooved = fits.iter().any(|fit| fit.is_narrow_groove);
+        let is_doubted = self.way == Way::Steps && (self.has_gaps() || may_be_grooved);
+        let share = if is_doubted && has_room && is_plain {
             self.sigma_share(fits, &found).max(1.0)
         } else {
             1.0
