@@ -87,8 +87,7 @@ impl Spread {
         // Along a bent bead the waves' bend is an error of the direction as well.
         let by_bend = sections.oblique_by_bend / scene.reach();
         let of_axis = beyond * first + bends.chance_bent * by_bend * by_bend * waves[1];
-        // The square of a Gaussian slope has twice its squared mean as variance.
-        let variance = of_axis + 2.0 * of_slope * of_slope + of_bends * of_bends;
+        let variance = of_axis + of_slope * of_slope + of_bends * of_bends;
         (of_slope + per_bend * bends.of_waves, variance)
     }
 

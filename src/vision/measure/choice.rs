@@ -155,7 +155,8 @@ impl Work {
 
     /// A width between blurred steps. Where rows were sorted out and neither grains nor
     /// sparks are seen, as unsure as all rows say it is: those that are left were
-    /// chosen, as from a texture that was not told. The same beside what may be a narrow groove.
+    /// chosen, as from a texture that was not told. The same beside what
+    /// may be a narrow groove, where the grounds differ.
     pub(super) fn at_least_as_unsure(
         &self,
         fits: &[RoughFit; 2],
@@ -163,7 +164,7 @@ impl Work {
     ) -> WidthMeasurement {
         let is_plain = fits.iter().all(|fit| fit.odd_share < GRAINS);
         let has_room = self.width_px > NARROW_PX;
-        let may_be_grooved = fits.iter().any(|fit| fit.is_narrow_groove);
+        let may_be_grooved = self.has_two_grounds() && fits.iter().any(|fit| fit.is_narrow_groove);
         let is_doubted = self.way == Way::Steps && (self.has_gaps() || may_be_grooved);
         let share = if is_doubted && has_room && is_plain {
             self.sigma_share(fits, &found).max(1.0)
