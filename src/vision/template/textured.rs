@@ -61,8 +61,8 @@ impl Template {
         Some(scatter)
     }
 
-    /// Shares of the texture that the pixels have from the first one that counts on: where the
-    /// phases' edges lie differs by less than texture hangs together.
+    /// Shares of the texture that the pixels have from the first one that counts on. One phase
+    /// stands for all: their edges lie apart by less than a texture's correlation length.
     fn texture_beside(&self, first: usize, texture: &Texture) -> [f64; MOST] {
         let parts = &self.parts[PHASES / 2 * MAX_CHUNKS..][..self.chunks];
         std::array::from_fn(|k| {
