@@ -322,8 +322,10 @@ impl Work {
                 return self.take_rough(&fits, strip, view, surface);
             }
             self.check_flanks(&fits)?;
+            self.check_lines_in_pattern()?;
             return Ok(self.at_least_as_unsure(&fits, found));
         }
+        self.check_lines_in_pattern()?;
         Ok(found)
     }
 

@@ -3,11 +3,12 @@
 
 use std::ops::RangeInclusive;
 
-use super::judge::{WIDEST_BLUR_PX, WIDEST_MOTION_PX};
+use super::judge::{STRANGE, WIDEST_BLUR_PX, WIDEST_MOTION_PX};
 use super::rough::WIDEST_ROUGH_PX;
 use super::{Way, Work};
 use crate::vision::reject::Reject;
 use crate::vision::rough::RoughFit;
+use crate::vision::trace::Tracer;
 use crate::vision::width::WidthMeasurement;
 
 /// Share of an edge's rows that may be sorted out: more are bays, or grains.
@@ -31,9 +32,20 @@ const SAME_PX: f64 = 0.25;
 /// of 2 to 2.5 px that is a little darker than the ground moves a blurred step by a third of a
 /// pixel and shows in nothing else.
 const TWO_GROUNDS: f64 = 0.1;
+/// Pattern beside both edges, as a fraction of the contrast, from which on a blurred step
+/// may have parts of it in its flank: widths were up to 3 px off by seven times what steps say.
+const NOTABLE_PATTERN: f64 = 0.2;
+/// How much less sure edges in such a pattern are that were located line by line: widths of 30,000
+/// drawn frames were up to seven times what lines say off.
+const LINES_IN_PATTERN: f64 = 2.0;
 /// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a
-/// wide flank.
-const PART_OF_FLANK: f64 = 0.5;
+/// wide flank, and its blur from which on it is: steps within the ramps of motions of 15 px and
+/// more have 2.9 px, those beside a shadow the lens's.
+const PART_OF_FLANK: f64 = 0.55;
+const PART_BLUR_PX: f64 = 2.5;
+/// The same as a fraction of the levels' difference a few pixels before and after it, below
+/// which a ramp, a rib or a shadow may lie there.
+const PART_OF_LEVELS: f64 = 0.8;
 /// Range of the same of one edge alone, where either is wide: below it the rest of its flank
 /// was taken for shading, beyond it shading for its flank. Drawn edges of up to 20 px of
 /// motion, or up to 6 px of blur, whose widths were right had 0.99 to 1.056, those that were
@@ -63,7 +75,13 @@ impl Work {
             return false;
         }
         let is_other = self.is_refined() || self.is_beside_groove || self.is_wide();
-        is_other || self.has_gaps() || self.has_two_grounds()
+        is_other || self.has_gaps() || self.has_two_grounds() || self.has_low_step()
+    }
+
+    /// Whether a step is much lower than the levels on either side of it differ: it may lie
+    /// within a ramp, most of which was taken for shading, or beside a rib.
+    fn has_low_step(&self) -> bool {
+        is_part(&self.left, self.contrasts[0]) || is_part(&self.right, self.contrasts[1])
     }
 
     /// Whether edges were located line by line.
@@ -107,7 +125,8 @@ impl Work {
         let mut sides = fits.iter().zip(self.contrasts);
         let is_wide = self.is_refined() && fits.iter().any(|fit| fit.blur_px > WIDEST_ROUGH_PX)
             || fits.iter().all(|fit| fit.blur_px > WIDEST_BLUR_PX);
-        is_wide || sides.all(|(fit, step)| step < PART_OF_FLANK * fit.contrast)
+        let may_be_part = self.left.blur_px.max(self.right.blur_px) > PART_BLUR_PX;
+        is_wide || may_be_part && sides.all(|(fit, step)| step < PART_OF_FLANK * fit.contrast)
     }
 
     /// Refuses wide steps of which one is a part of its flank, or more.
@@ -153,25 +172,45 @@ impl Work {
         rough_px * self.mm_per_px / found.sigma.get()
     }
 
-    /// A width between blurred steps. Where rows were sorted out and neither grains nor
-    /// sparks are seen, as unsure as all rows say it is: those that are left were
-    /// chosen, as from a texture that was not told. The same beside what
-    /// may be a narrow groove, where the grounds differ.
+    /// A width between blurred steps, as unsure as all rows say it is where rows are better
+    /// trusted, on beads wide enough for their level to be read free of the flanks: where some were sorted out and neither grains nor sparks are seen, for those
+    /// that are left were chosen, as from a texture that was not told; beside what may be a
+    /// narrow groove, where the grounds differ; and in a pattern. Where a step is but a part
+    /// of the levels' difference, or none fits and rows tell a narrow groove, sigma contains how
+    /// far the rows' edges lie elsewhere.
     pub(super) fn at_least_as_unsure(
         &self,
         fits: &[RoughFit; 2],
         found: WidthMeasurement,
     ) -> WidthMeasurement {
+        if self.width_px <= NARROW_PX {
+            return found;
+        }
         let is_plain = fits.iter().all(|fit| fit.odd_share < GRAINS);
-        let has_room = self.width_px > NARROW_PX;
-        let may_be_grooved = self.has_two_grounds() && fits.iter().any(|fit| fit.is_narrow_groove);
-        let is_doubted = self.way == Way::Steps && (self.has_gaps() || may_be_grooved);
-        let share = if is_doubted && has_room && is_plain {
-            self.sigma_share(fits, &found).max(1.0)
-        } else {
-            1.0
+        let may_be_grooved = fits.iter().any(|fit| fit.is_narrow_groove);
+        let is_doubted = is_plain && (self.has_gaps() || may_be_grooved && self.has_two_grounds());
+        let is_in_pattern = self.pattern_share > NOTABLE_PATTERN;
+        let share = match self.way {
+            Way::Steps if is_doubted || is_in_pattern => self.sigma_share(fits, &found).max(1.0),
+            Way::Lines if is_in_pattern => LINES_IN_PATTERN,
+            _ => 1.0,
         };
-        WidthMeasurement { sigma: found.sigma * share, ..found }
+        let off = self.mm_per_px * self.off_rows_px(fits) / found.sigma.get();
+        WidthMeasurement { sigma: found.sigma * (share * share + off * off).sqrt(), ..found }
+    }
+
+    /// How far edges lie from the rows' \[px\] where a step is but a part of the levels'
+    /// difference, or none fits and the rows tell a narrow groove.
+    fn off_rows_px(&self, fits: &[RoughFit; 2]) -> f64 {
+        let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
+        let off = [0, 1].map(|k| {
+            let (found, rough) = sides[k];
+            let is_step = self.way == Way::Steps && found.misfit_of_a_row() < STRANGE;
+            let off = (rough.middle() - found.middle()).abs();
+            let is_part = is_part(found, self.contrasts[k]) && off < WIDER_PX;
+            if is_part || !is_step && fits[k].is_narrow_groove { off } else { 0.0 }
+        });
+        off[0] + off[1]
     }
 
     /// Whether a rough edge lies farther out than its blurred step, with no narrow
@@ -212,6 +251,12 @@ impl Work {
             !self.is_wide() && (has_bays || hidden && !is_covered)
         }
     }
+}
+
+/// Whether a step is but a part of the difference of the levels on either side of it.
+fn is_part(tracer: &Tracer, step: f64) -> bool {
+    let [before, after] = tracer.levels();
+    step < PART_OF_LEVELS * (after - before).abs()
 }
 
 /// Whether edges show bead and what lies outside, and no grains.

@@ -1,7 +1,7 @@
 //! What is not believed: edges that disagree with themselves or with each other,
 //! and steps that are too low.
 
-use super::Work;
+use super::{Way, Work};
 use crate::vision::gauge::EdgeKind;
 use crate::vision::ground::{Place, Side};
 use crate::vision::number::float;
@@ -18,7 +18,7 @@ const NEED_ROWS: f64 = 0.4;
 const NEED_CLEAR_ROWS: f64 = 0.16;
 /// Misfit of a blurred step from which on, if both have it, edges are located
 /// line by line: one alone is more likely covered than of another kind.
-const STRANGE: f64 = 2.0;
+pub(super) const STRANGE: f64 = 2.0;
 /// The same for one edge alone.
 const VERY_STRANGE: f64 = 8.0;
 /// Largest standard deviation of a width whose edges are covered in part
@@ -49,9 +49,12 @@ const LOST_SCATTER_PX: f64 = 0.5;
 /// Strongest pattern beside the bead, as a share of the contrast: a pattern of a third
 /// is measured, of a stronger one parts are taken for the bead.
 const STRONGEST_PATTERN: f64 = 0.37;
+/// The same where edges were located line by line: drawn widths beside a pattern of 0.25 and
+/// 0.31 were 53 and 22 px off. A real strand has up to 0.2, real printed lines up to 0.24.
+const STRONGEST_OF_LINES: f64 = 0.25;
 /// Share of a pattern beside an edge that counts for its place: at the edge it is half
-/// covered by the bead.
-const PATTERN_SHARE: f64 = 0.5;
+/// covered by the bead, and the widths of drawn beads tell a little less.
+const PATTERN_SHARE: f64 = 0.46;
 /// √(2π): the slope of a Gaussian flank is its height over that and its blur.
 const ROOT_TWO_PI: f64 = 2.506_628_274_631_000_5;
 /// Widest blur of an edge that is measured \[px\]: rendered motion, a box of 20.8 px,
@@ -156,6 +159,14 @@ impl Work {
         self.pattern_share = strengths[0].min(strengths[1]);
         let (got, limit) = (of_both(strengths[0], strengths[1]), STRONGEST_PATTERN);
         if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
+    }
+
+    /// Refuses edges in a pattern that were located line by line: parts of it were taken for
+    /// them.
+    pub(super) fn check_lines_in_pattern(&self) -> Result<(), Reject> {
+        let (got, limit) = (self.pattern_share, STRONGEST_OF_LINES);
+        let is_among = self.way == Way::Lines && got > limit;
+        if is_among { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
     }
 
     /// Scatter of an edge from which on it is noise \[px\].
