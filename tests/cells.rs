@@ -84,6 +84,29 @@ fn a_single_scale_may_have_a_standard_deviation_smaller_than_itself() {
 }
 
 #[test]
+fn a_target_that_the_gauge_would_refuse_is_reported_with_its_key() {
+    let text = fs::read_to_string(root().join("cells/live.toml")).unwrap();
+    let with = |target: &str, layers: &str| {
+        let text = text.replace("target_width_mm = 42.0", target);
+        let text = format!("{text}\n{layers}");
+        Cell::parse(Path::new("cells/cell.toml"), &text, Purpose::Run)
+    };
+    let course = "target_width_mm = 42.0\npath_mm = [0.0, 100.0]\npath_width_mm =";
+    let layers = "[layers]\nfirst_z_mm = 20.0\nheight_mm = 10.0\nwidth_mm =";
+    let plain = "target_width_mm = 42.0";
+    for (target, layers, found) in [
+        ("target_width_mm = 62.0".into(), String::new(), "control.target_width_mm: found 62"),
+        (format!("{course} [42.0, 19.0]"), String::new(), "control.path_width_mm: found 19"),
+        (plain.into(), format!("{layers} [42.0, 61.5]"), "layers.width_mm: found 61.5"),
+    ] {
+        let said = with(&target, &layers).unwrap_err().to_string();
+        let line = format!("{found}, expected within width_range_mm of [gauge], 20 mm to 60 mm");
+        assert!(said.contains(&line), "no \"{line}\" in\n{said}");
+    }
+    assert!(with(&format!("{course} [20.0, 60.0]"), &format!("{layers} [42.0, 50.0]")).is_ok());
+}
+
+#[test]
 fn the_gauge_names_edge_sigma_and_gamma() {
     let text = fs::read_to_string(root().join("cells/process.toml")).unwrap();
     let with = |line: &str| {

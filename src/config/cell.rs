@@ -181,6 +181,9 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let layers = root.table("layers");
     let target =
         control_table.as_ref().and_then(|t| control::read_course(t, layers.as_ref(), width));
+    if let (Some(table), Some(target), Some(gauge)) = (&control_table, &target, &gauge) {
+        control::check_target(table, layers.as_ref(), target, gauge.width_range);
+    }
     let control = control_table.as_ref().and_then(|t| control::read_control(t, target.clone()));
     let camera_table = root.run_table("camera");
     let mount = camera_table.as_ref().and_then(read_mount);

@@ -138,6 +138,31 @@ pub fn check_steps(control: &Table<'_>, law: WidthLaw, start: MmPerS, limits: Li
     }
 }
 
+/// Reports a target that the gauge would refuse as no width of the bead's. `layers` is the
+/// section of the layers' widths.
+pub fn check_target(
+    control: &Table<'_>,
+    layers: Option<&Table<'_>>,
+    target: &Target,
+    (low, high): (Mm, Mm),
+) {
+    let outside = |width: &Mm| *width < low || *width > high;
+    let report = |table: &Table<'_>, key: &'static str, width: Mm| {
+        let expected = format!("within width_range_mm of [gauge], {low} to {high}");
+        table.report(key, format!("{}", width.get()), expected);
+    };
+    if outside(&target.nominal()) {
+        report(control, "target_width_mm", target.nominal());
+    }
+    if let Some(width) = target.knots().iter().map(|knot| knot.width).find(outside) {
+        report(control, "path_width_mm", width);
+    }
+    let widths = target.layers().map(|layers| layers.widths.as_slice()).unwrap_or_default();
+    if let (Some(table), Some(width)) = (layers, widths.iter().copied().find(outside)) {
+        report(table, "width_mm", width);
+    }
+}
+
 /// The width that is asked for, with its course along the path and by layer.
 pub fn read_course(
     control: &Table<'_>,

@@ -74,6 +74,11 @@ impl Target {
         self.width
     }
 
+    /// The knots of the course along the path; empty where there is none.
+    pub fn knots(&self) -> &[Knot] {
+        &self.along
+    }
+
     /// The layers, where there are any.
     pub const fn layers(&self) -> Option<&Layers> {
         self.layers.as_ref()

@@ -187,7 +187,7 @@ impl fmt::Display for Reject {
             Self::NoPair { got, need } => write!(
                 f,
                 "edges that belong together on {:.0} % of the caliper lines, {:.0} % are needed; a bead has to run through the whole gauge along bead_axis, with a width in width_range_mm and the polarity that is named",
-                got * 100.0,
+                (got * 100.0).abs(),
                 need * 100.0
             ),
             Self::LowContrast { got, need } => {

@@ -52,6 +52,16 @@ impl Waves {
         }
     }
 
+    /// Part of the waves' first order that an axis along the edges is off by, in the mean of
+    /// squares: widths of drawn rough beads are without bias up to a third with it. That of
+    /// torn ones, with grooves and texture beside them, is larger.
+    pub fn slope_share(self) -> f64 {
+        match self {
+            Self::Smooth => 0.6,
+            Self::Torn => 0.9,
+        }
+    }
+
     fn correlation(self, lengths: f64) -> f64 {
         match self {
             Self::Smooth => (1.0 + 3f64.sqrt() * lengths) * (-3f64.sqrt() * lengths).exp(),

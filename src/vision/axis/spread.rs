@@ -82,7 +82,7 @@ impl Spread {
         // Waves make a slope of their own; only what is beyond them is that of
         // an axis, along which an error of the direction counts.
         let beyond = (oblique - OBLIQUE * sections.mean * sections.mean * first).max(0.0);
-        let of_slope = 0.5 * sections.mean * first;
+        let of_slope = 0.5 * scene.kind_of_waves().slope_share() * sections.mean * first;
         let of_bends = per_bend * bends.doubt;
         // Along a bent bead the waves' bend is an error of the direction as well.
         let by_bend = sections.oblique_by_bend / scene.reach();
@@ -164,6 +164,12 @@ impl Side<'_> {
 }
 
 impl Scene<'_> {
+    /// Edges that are known row by row are torn.
+    fn kind_of_waves(&self) -> Waves {
+        let is_torn = self.sides.iter().any(|side| side.mean_variance.is_some());
+        if is_torn { Waves::Torn } else { Waves::Smooth }
+    }
+
     /// How much of the midline's coefficients of the orders 1 to 4 is the
     /// waviness of the two edges \[px²\]; `None` where there is none to speak
     /// of. The width's course tells, and of the midline what is no straight or
@@ -203,8 +209,7 @@ impl Scene<'_> {
                 evidence.add(order, f64::midpoint(all(0), all(1)), noise);
             }
         }
-        let is_torn = self.sides.iter().any(|side| side.mean_variance.is_some());
-        evidence.waves(if is_torn { Waves::Torn } else { Waves::Smooth })
+        evidence.waves(self.kind_of_waves())
     }
 }
 
