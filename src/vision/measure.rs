@@ -315,16 +315,17 @@ impl Work {
         {
             return textured;
         }
-        if self.may_be_more_than_steps()
+        let found = if self.may_be_more_than_steps()
             && let Ok(fits) = self.find_rough(strip, range)
         {
             if self.explains_more(&fits, &found) {
                 return self.take_rough(&fits, strip, view, surface);
             }
             self.check_flanks(&fits)?;
-            self.check_lines_in_pattern()?;
-            return Ok(self.at_least_as_unsure(&fits, found));
-        }
+            self.at_least_as_unsure(&fits, found)
+        } else {
+            found
+        };
         self.check_lines_in_pattern()?;
         Ok(found)
     }

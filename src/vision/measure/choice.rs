@@ -35,8 +35,8 @@ const TWO_GROUNDS: f64 = 0.1;
 /// Pattern beside both edges, as a fraction of the contrast, from which on a blurred step
 /// may have parts of it in its flank: widths were up to 3 px off by seven times what steps say.
 const NOTABLE_PATTERN: f64 = 0.2;
-/// How much less sure edges in such a pattern are that were located line by line: widths of 30,000
-/// drawn frames were up to seven times what lines say off.
+/// Factor of sigma where edges in such a pattern were located line by line: of 30,000 drawn
+/// widths some were off by up to seven of the sigmas that lines say.
 const LINES_IN_PATTERN: f64 = 2.0;
 /// Contrast of a step, as a fraction of the rough edge's, below which it is a part of a
 /// wide flank, and its blur from which on it is: steps within the ramps of motions of 15 px and
@@ -173,11 +173,12 @@ impl Work {
     }
 
     /// A width between blurred steps, as unsure as all rows say it is where rows are better
-    /// trusted, on beads wide enough for their level to be read free of the flanks: where some were sorted out and neither grains nor sparks are seen, for those
+    /// trusted: where some were sorted out and neither grains nor sparks are seen, for those
     /// that are left were chosen, as from a texture that was not told; beside what may be a
     /// narrow groove, where the grounds differ; and in a pattern. Where a step is but a part
     /// of the levels' difference, or none fits and rows tell a narrow groove, sigma contains how
-    /// far the rows' edges lie elsewhere.
+    /// far the rows' edges lie elsewhere. Nothing is added on narrow beads, whose level rows do
+    /// not read free of the flanks.
     pub(super) fn at_least_as_unsure(
         &self,
         fits: &[RoughFit; 2],

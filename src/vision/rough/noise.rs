@@ -11,8 +11,8 @@ use crate::vision::strip::Grey;
 /// Blocks over which texture is taken to be correlated at most.
 const MAX_LAG: usize = 6;
 /// Fraction of the irregular length of a flank by which an edge may lie elsewhere in it: half,
-/// were the flank an even ramp; less, as drawn bays show, whose widths scatter by 0.7 of what a
-/// quarter foretells.
+/// were the flank an even ramp. Of drawn bays, whose widths have 0.75 times the standard
+/// deviation that a quarter predicts, it is less.
 const FLANK_FRACTION: f64 = 0.2;
 /// How far the ground's pattern between its level and the edge may be off, in standard
 /// deviations of the level from place to place: an edge that is drawn outwards by bright
