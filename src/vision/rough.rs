@@ -47,10 +47,14 @@ const UNKNOWN_BLUR: Blur = Blur { px: 1.8, variance: 1.0 };
 const SAME_BLUR: f64 = 0.02;
 const FINE_FRACTION: f64 = 0.2;
 
-/// How likely a groove that does not show its depth must be to be looked at, and for it to be
-/// doubted that there is none.
+/// How likely a groove that does not show its depth must be to be looked at, for it to be
+/// doubted that there is none, and for the shape of the whole flank to be doubted as well where
+/// it lies so far from where rows pass half height \[px\]: of drawn edges beside weak narrow
+/// grooves, some that were taken for sloping ground lay 0.7 px off.
 const LIKELY_GROOVE: f64 = 0.18;
-const POSSIBLE_GROOVE: f64 = 0.1;
+const POSSIBLE_GROOVE: f64 = 0.085;
+const CONCEIVABLE_GROOVE: f64 = 0.03;
+const FAR_OFF_PX: f64 = 0.5;
 
 /// Standard deviation of the place of an edge beside a groove that hides its depth that its
 /// waves leave open, as a fraction of theirs and at most \[px\]: the mean over them is no Gaussian
@@ -227,8 +231,13 @@ impl RoughEdge {
             }
             shape.variance.max(noise.of_mean) + (SHIFT_FRACTION * shift).powi(2)
         };
-        let possible = shape.filter(|shape| shape.groove_share > POSSIBLE_GROOVE);
-        let doubted = possible.map_or(0.0, |shape| shape.variance).max(noise.of_mean);
+        let of_doubt = |shape: EdgeShape| {
+            let is_possible = shape.groove_share > POSSIBLE_GROOVE;
+            let is_far = shape.groove_share > CONCEIVABLE_GROOVE && off(&shape).abs() > FAR_OFF_PX;
+            let of_place = if is_possible { shape.variance } else { 0.0 };
+            of_place + if is_far { off(&shape).powi(2) } else { 0.0 }
+        };
+        let doubted = shape.map_or(0.0, of_doubt).max(noise.of_mean);
         self.gather(scene, noise.of_row);
         let seen = self.crossings.at.iter().filter(|at| at.is_finite()).count();
         Some(RoughFit {

@@ -187,9 +187,9 @@ impl Work {
         if self.width_px <= NARROW_PX {
             return found;
         }
-        let is_plain = fits.iter().all(|fit| fit.odd_share < GRAINS);
         let may_be_grooved = fits.iter().any(|fit| fit.is_narrow_groove);
-        let is_doubted = is_plain && (self.has_gaps() || may_be_grooved && self.has_two_grounds());
+        let is_doubted =
+            is_plain(fits) && (self.has_gaps() || may_be_grooved && self.has_two_grounds());
         let is_in_pattern = self.pattern_share > NOTABLE_PATTERN;
         let share = match self.way {
             Way::Steps if is_doubted || is_in_pattern => self.sigma_share(fits, &found).max(1.0),
@@ -201,12 +201,15 @@ impl Work {
     }
 
     /// How far edges lie from the rows' \[px\] where a step is but a part of the levels'
-    /// difference, or none fits and the rows tell a narrow groove.
+    /// difference, or the rows tell a narrow groove and no step fits, or not on all rows beside
+    /// grounds that differ.
     fn off_rows_px(&self, fits: &[RoughFit; 2]) -> f64 {
         let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
+        let shows_two_grounds = self.has_gaps() && self.has_two_grounds() && is_plain(fits);
         let off = [0, 1].map(|k| {
             let (found, rough) = sides[k];
-            let is_step = self.way == Way::Steps && found.misfit_of_a_row() < STRANGE;
+            let is_fit = self.way == Way::Steps && found.misfit_of_a_row() < STRANGE;
+            let is_step = is_fit && !shows_two_grounds;
             let off = (rough.middle() - found.middle()).abs();
             let is_part = is_part(found, self.contrasts[k]) && off < WIDER_PX;
             if is_part || !is_step && fits[k].is_narrow_groove { off } else { 0.0 }
@@ -258,6 +261,11 @@ impl Work {
 fn is_part(tracer: &Tracer, step: f64) -> bool {
     let [before, after] = tracer.levels();
     step < PART_OF_LEVELS * (after - before).abs()
+}
+
+/// Whether neither grains nor sparks are seen about the edges.
+fn is_plain(fits: &[RoughFit; 2]) -> bool {
+    fits.iter().all(|fit| fit.odd_share < GRAINS)
 }
 
 /// Whether edges show bead and what lies outside, and no grains.

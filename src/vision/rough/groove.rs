@@ -135,7 +135,7 @@ struct Model {
 impl Model {
     /// Whether it is a narrow line that is darker than what lies beyond.
     fn is_dip(&self) -> bool {
-        self.width < WIDEST_DIP_PX && self.grey < self.beyond
+        self.width > WIDTH_PX.0 && self.width < WIDEST_DIP_PX && self.grey < self.beyond
     }
 
     /// The unknowns in the order of the derivatives.
