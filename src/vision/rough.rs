@@ -61,6 +61,10 @@ const FAR_OFF_PX: f64 = 0.5;
 /// flank. Measured on 12,000 rendered beads.
 const GROOVE_WAVES: f64 = 0.15;
 const MOST_GROOVE_WAVES_PX: f64 = 0.15;
+/// The same beside one that shows it and is not wider than that \[px\]: without it, 3.5 of 30,000
+/// drawn widths were more than 5 sigma off, with it 2.5.
+const NARROW_GROOVE_WAVES: f64 = 0.06;
+const NARROW_GROOVE_PX: f64 = 7.5;
 
 /// Standard deviation, beside that of noise, of where rows pass half height as the edge beside
 /// a groove \[px\]: its floor may be hidden, and torn edges have no Gaussian flank. Averaged
@@ -207,9 +211,12 @@ impl RoughEdge {
                 && off(shape).abs() < MOST_OFF * level * f64::from(INSIDE_PX)
         };
         let shaped = shape.filter(|shape| is_groove_likely || of_level(shape));
+        let waves = noise::roughness(&self.crossings).sqrt();
+        let is_narrow = !on_ground && shape.is_some_and(|shape| shape.width() < NARROW_GROOVE_PX);
         let of_waves = if hides_depth {
-            let waves = noise::roughness(&self.crossings).sqrt();
             (GROOVE_WAVES * waves).min(MOST_GROOVE_WAVES_PX).powi(2)
+        } else if is_narrow {
+            (NARROW_GROOVE_WAVES * waves).powi(2)
         } else {
             0.0
         };

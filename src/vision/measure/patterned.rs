@@ -239,7 +239,9 @@ impl Work {
         }
         // An edge beside a strong pattern is drawn to its bright places.
         let beside = ground * (1.0 + (got / STRONGEST).powi(4)) + bead;
-        let variance = beside * doubt_of_blur(blur_px);
+        // A flank's slope falls with its blur, and what a texture moves an edge by grows with it.
+        let doubt = doubt_of_blur(blur_px);
+        let variance = beside * if pattern > 0.0 { doubt } else { doubt * doubt };
         let fits = [one, other].map(|fit| fit.as_rough(blur_px, variance));
         even::check(&fits, even::middle_grey(strip, pair))?;
         self.left_px.clear();

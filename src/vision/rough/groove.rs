@@ -72,6 +72,11 @@ pub struct EdgeShape {
 }
 
 impl EdgeShape {
+    /// Width of the groove beside the edge \[px\].
+    pub fn width(&self) -> f64 {
+        self.model.width
+    }
+
     /// Likeliest value of one shape or another one, the latter so likely, and the
     /// variance of both (Bayesian model averaging).
     fn or(&self, other: &Self, share: f64) -> Self {
