@@ -184,6 +184,7 @@ impl Reject {
 impl fmt::Display for Reject {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            // The sum of no rows at all is −0.
             Self::NoPair { got, need } => write!(
                 f,
                 "edges that belong together on {:.0} % of the caliper lines, {:.0} % are needed; a bead has to run through the whole gauge along bead_axis, with a width in width_range_mm and the polarity that is named",

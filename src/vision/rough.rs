@@ -211,12 +211,12 @@ impl RoughEdge {
                 && off(shape).abs() < MOST_OFF * level * f64::from(INSIDE_PX)
         };
         let shaped = shape.filter(|shape| is_groove_likely || of_level(shape));
-        let waves = noise::roughness(&self.crossings).sqrt();
         let is_narrow = !on_ground && shape.is_some_and(|shape| shape.width() < NARROW_GROOVE_PX);
+        let waves = || noise::roughness(&self.crossings).sqrt();
         let of_waves = if hides_depth {
-            (GROOVE_WAVES * waves).min(MOST_GROOVE_WAVES_PX).powi(2)
+            (GROOVE_WAVES * waves()).min(MOST_GROOVE_WAVES_PX).powi(2)
         } else if is_narrow {
-            (NARROW_GROOVE_WAVES * waves).powi(2)
+            (NARROW_GROOVE_WAVES * waves()).powi(2)
         } else {
             0.0
         };
