@@ -64,7 +64,7 @@ impl Tree {
     pub fn read(root: &Path) -> Result<Self, String> {
         let mut tree = Self { modules: Vec::new() };
         let folder = root.parent().unwrap_or(Path::new("."));
-        tree.read_file(root, folder, Vec::new(), None)?;
+        tree.read_file(root, folder, &[], None)?;
         Ok(tree)
     }
 
@@ -72,7 +72,7 @@ impl Tree {
         &mut self,
         file: &Path,
         folder: &Path,
-        path: Vec<String>,
+        path: &[String],
         parent: Option<ModuleId>,
     ) -> Result<ModuleId, String> {
         let text = fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?;
@@ -85,12 +85,12 @@ impl Tree {
         items: Vec<syn::Item>,
         file: &Path,
         folder: &Path,
-        path: Vec<String>,
+        path: &[String],
         parent: Option<ModuleId>,
     ) -> Result<ModuleId, String> {
         let id = self.modules.len();
         self.modules.push(Module {
-            path: path.clone(),
+            path: path.to_owned(),
             file: file.to_path_buf(),
             parent,
             ..Module::default()
@@ -104,17 +104,16 @@ impl Tree {
                 syn::Item::Use(_) => {}
                 syn::Item::Mod(module) => {
                     let name = module.ident.to_string();
-                    let mut inner = path.clone();
+                    let mut inner = path.to_owned();
                     inner.push(name.clone());
                     let below = folder.join(&name);
-                    let child = match module.content {
-                        Some((_, items)) => self.add(items, file, &below, inner, Some(id))?,
-                        None => {
-                            let flat = folder.join(format!("{name}.rs"));
-                            let nested = below.join("mod.rs");
-                            let file = if flat.is_file() { flat } else { nested };
-                            self.read_file(&file, &below, inner, Some(id))?
-                        }
+                    let child = if let Some((_, items)) = module.content {
+                        self.add(items, file, &below, &inner, Some(id))?
+                    } else {
+                        let flat = folder.join(format!("{name}.rs"));
+                        let nested = below.join("mod.rs");
+                        let file = if flat.is_file() { flat } else { nested };
+                        self.read_file(&file, &below, &inner, Some(id))?
                     };
                     self.modules[id].children.insert(name, child);
                 }
