@@ -5,9 +5,9 @@
 #![expect(clippy::expect_used, reason = "a benchmark of sound input")]
 
 use divan::Bencher;
-use truebead::control::distance::{ByDistance, DistanceSettings};
-use truebead::time::{Span, Stamp};
-use truebead::units::{Mm, MmPerS};
+use truebead::core::time::{Span, Stamp};
+use truebead::core::units::{Mm, MmPerS};
+use truebead::width_control::distance::{ByDistance, DistanceSettings};
 
 const FRAME_S: f64 = 0.02;
 

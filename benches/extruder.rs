@@ -4,10 +4,10 @@
 #![expect(clippy::expect_used, reason = "a benchmark of sound input")]
 
 use divan::Bencher;
+use truebead::core::time::{Span, Stamp};
+use truebead::core::units::{MPa, Rpm};
 use truebead::extruder::pressure::{PressureLaw, Running};
-use truebead::sim::ma2026::Tried;
-use truebead::time::{Span, Stamp};
-use truebead::units::{MPa, Rpm};
+use truebead::studies::ma2026::Tried;
 
 const READING: Span = Span::from_millis(20);
 const COMMAND: Span = Span::from_millis(50);

@@ -13,13 +13,13 @@ use std::time::Instant;
 
 use divan::Bencher;
 use truebead::bridge::{EdgeSettings, LineFinder};
-use truebead::calib::{Calibration, SurfaceMap, file};
-use truebead::frame::{Frame, Pixels};
-use truebead::geometry::Roi;
-use truebead::sim::picture::Picture;
+use truebead::calibration::{Calibration, SurfaceMap, file};
+use truebead::core::frame::{Frame, Pixels};
+use truebead::core::geometry::Roi;
+use truebead::core::time::Stamp;
+use truebead::core::units::Mm;
+use truebead::scenario::image::Picture;
 use truebead::sim::render::Renderer;
-use truebead::time::Stamp;
-use truebead::units::Mm;
 use truebead::vision::{Axis, Gauge, Measurer, Method, Polarity};
 
 const MM_PER_PX: f64 = 0.126_582;

@@ -3,12 +3,12 @@
 #![expect(clippy::expect_used, reason = "a benchmark of sound input")]
 
 use divan::Bencher;
-use truebead::calib::Calibration;
-use truebead::geometry::Roi;
-use truebead::sim::picture::{Motion, Picture};
+use truebead::calibration::Calibration;
+use truebead::core::geometry::Roi;
+use truebead::core::time::Stamp;
+use truebead::core::units::Mm;
+use truebead::scenario::image::{Motion, Picture};
 use truebead::sim::render::Renderer;
-use truebead::time::Stamp;
-use truebead::units::Mm;
 use truebead::vision::{Axis, Gauge, Polarity};
 
 const USUAL: Picture = Picture { size_px: [720, 100], ..Picture::USUAL };

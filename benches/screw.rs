@@ -5,13 +5,13 @@
 #![expect(clippy::expect_used, reason = "a benchmark of sound input")]
 
 use divan::{Bencher, black_box};
+use truebead::core::time::{Span, Stamp};
+use truebead::core::units::Mm;
 use truebead::extruder::screw::control::{Scheme, ScrewSettings};
 use truebead::extruder::screw::law::Setpoint;
 use truebead::extruder::screw::{
     FillLaw, PiecewiseExponential, Pulsation, Screw, ScrewControl, ScrewDesign,
 };
-use truebead::time::{Span, Stamp};
-use truebead::units::Mm;
 
 const A: Pulsation = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
 /// Share that is fed for as long as the delay lasts.

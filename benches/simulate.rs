@@ -6,12 +6,12 @@ use std::path::Path;
 use std::time::Instant;
 
 use divan::Bencher;
-use truebead::calib::Calibration;
-use truebead::config::Cell;
-use truebead::config::cell::Purpose;
-use truebead::runner::NoRecorder;
+use truebead::calibration::Calibration;
+use truebead::cell::Cell;
+use truebead::cell::file::Purpose;
+use truebead::core::units::Mm;
+use truebead::run::runner::NoRecorder;
 use truebead::sim::cell::{Deaf, SimCell};
-use truebead::units::Mm;
 
 const CELL: &str = include_str!("../cells/barjuei2022.toml");
 

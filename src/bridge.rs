@@ -15,7 +15,7 @@ use std::sync::Once;
 
 use opencv::core::{LogLevel, Mat, MatTraitConst, set_log_level, set_num_threads};
 
-use crate::frame::{Frame, Pixels};
+use crate::core::frame::{Frame, Pixels};
 
 /// OpenCV refused a task.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -28,7 +28,6 @@ macro_rules! tell {
 pub mod accuracy;
 pub mod board;
 pub mod calibrate;
-pub mod cell;
 pub mod check;
 pub mod compare;
 pub mod convert;
@@ -57,9 +56,11 @@ use std::process::ExitCode;
 use clap::{ArgAction, Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
+use crate::assembly::{AssemblyError, LoadedCell};
 use crate::document::Problems;
 use crate::io::calibration_file::CalibrationFileError;
 use crate::io::model_file::ModelFileError;
+use crate::sim::cell::Rig;
 
 /// Status of a command that finished, but with too many frames refused or
 /// records lost.
@@ -164,6 +165,22 @@ pub fn main() -> ExitCode {
     })
 }
 
+/// The extruder side of a simulated cell, with what is to be said about it.
+fn simulated_extruder(loaded: &LoadedCell) -> anyhow::Result<Option<Rig>> {
+    let side = loaded.simulated_extruder()?;
+    if let Some(side) = &side {
+        warn(&side.warnings);
+    }
+    Ok(side.map(|side| side.rig))
+}
+
+/// Prints warnings about a cell; nothing of them keeps it from running.
+fn warn(warnings: &[String]) {
+    for warning in warnings {
+        tell!("warning: {warning}");
+    }
+}
+
 /// Configuration and arguments are told from failures at work.
 fn status_of(error: &anyhow::Error) -> ExitCode {
     let wrong = error.chain().any(|cause| {
@@ -171,6 +188,7 @@ fn status_of(error: &anyhow::Error) -> ExitCode {
             || cause.is::<Problems>()
             || cause.is::<CalibrationFileError>()
             || cause.is::<ModelFileError>()
+            || cause.downcast_ref().is_some_and(AssemblyError::is_in_file)
     });
     ExitCode::from(if wrong { 2 } else { 1 })
 }

@@ -23,6 +23,7 @@ pub mod screw;
 pub mod start_stop;
 pub mod state;
 pub mod supervisor;
+pub mod trajectory;
 
 pub use demand::{FlowDemand, Follows, RobotFollows};
 pub use drive::Drive;

@@ -17,27 +17,29 @@
 //! `CONVENTIONS.md`; how the modules depend on each other is in
 //! `ARCHITECTURE.md`.
 
+pub mod assembly;
 pub mod bridge;
-pub mod calib;
+pub mod calibration;
+pub mod cell;
 pub mod cli;
-pub mod config;
 pub mod control;
-pub mod controller;
+pub mod core;
 pub mod document;
+pub mod drivers;
 pub mod extruder;
-pub mod frame;
-pub mod geometry;
 pub mod identify;
 pub mod io;
 pub mod link;
 pub mod live;
-pub mod model;
-pub mod offline;
+pub mod numeric;
 pub mod plan;
-pub mod ports;
-pub mod runner;
+pub mod report;
+pub mod rows;
+pub mod run;
+pub mod scenario;
 pub mod sim;
-pub mod time;
+pub mod simulators;
+pub mod studies;
 pub mod tune;
-pub mod units;
 pub mod vision;
+pub mod width_control;

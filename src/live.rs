@@ -26,23 +26,27 @@ use std::sync::atomic::AtomicU64;
 
 use crossbeam_channel::{Receiver, bounded, never, unbounded};
 
-use crate::calib::Calibration;
-use crate::config::Cell;
-use crate::config::cell::{RunPart, Source};
-use crate::config::extruder::ExtruderLink;
-use crate::controller::{Controller, Setup};
+use crate::calibration::Calibration;
+use crate::cell::Cell;
+use crate::cell::extruder::ExtruderLink;
+use crate::cell::file::{RunPart, Source};
+use crate::control::{Controller, Setup};
+use crate::core::time::Span;
+use crate::drivers::camera::open;
+use crate::drivers::camera::rendered::{RenderedCamera, RobotView};
+use crate::drivers::extruder::{
+    ExtruderClient, ExtruderConfig, ExtruderConfigError, ExtruderEvent,
+};
+use crate::drivers::robot::{LinkClient, LinkConfig, LinkConfigError, LinkTiming};
 use crate::extruder::{ExtruderSetup, FlowDemand};
-use crate::io::camera::open;
-use crate::io::camera::rendered::{RenderedCamera, RobotView};
 use crate::io::clock::RunClock;
-use crate::io::extruder::{ExtruderClient, ExtruderConfig, ExtruderConfigError, ExtruderEvent};
 use crate::io::record::{self, Incomplete, RecordConfig, RecordReport};
-use crate::io::robot::{LinkClient, LinkConfig, LinkConfigError, LinkTiming};
-use crate::offline::{LogError, Note, RunLog, Summary};
-use crate::ports::{FrameSource, RecordError, SourceError};
-use crate::runner::Runner;
+use crate::rows::log::RunLog;
+use crate::rows::output::LogError;
+use crate::rows::summary::{Note, Summary};
+use crate::run::ports::{FrameSource, RecordError, SourceError};
+use crate::run::runner::Runner;
 use crate::sim::render::{RenderError, Renderer};
-use crate::time::Span;
 
 pub use control::Ending;
 use control::{ExtruderWatch, LinkPort, Loop, Sources, StepsWatch};

@@ -27,7 +27,6 @@
 //! 4. **Horizons.** A long job is planned a few seconds at a time, each from what was
 //!    decided before it.
 
-mod course;
 mod descent;
 mod extruder;
 pub mod foretell;
@@ -45,7 +44,6 @@ mod step;
 #[cfg(test)]
 mod tests;
 
-pub use course::{Planned, PlannedCourse, PlannedJob, TableError};
 pub use foretell::{Foretold, Unplanned};
 pub use limits::{PathLimits, attainable, time_optimal};
 pub use profile::{ProfileError, SpeedProfile};

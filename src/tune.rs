@@ -38,7 +38,7 @@ pub struct Known {
 pub enum TuneError {
     /// The bead does not tell its model.
     #[error(transparent)]
-    Bead(#[from] crate::control::offset::OffsetError),
+    Bead(#[from] crate::identify::camera_offset::OffsetError),
     /// The widths hardly tell how the bead answers the speed.
     #[error(
         "the exponent is {exponent:.2} ± {sigma:.2}, known no better than to a third of itself: \

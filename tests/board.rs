@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use nalgebra::{Rotation3, Vector3};
-use truebead::calib::board::Board;
-use truebead::calib::plane::bed_from_board;
-use truebead::calib::{Camera, file};
-use truebead::frame::Frame;
-use truebead::geometry::Pose;
+use truebead::calibration::board::Board;
+use truebead::calibration::plane::bed_from_board;
+use truebead::calibration::{Camera, file};
+use truebead::core::frame::Frame;
+use truebead::core::geometry::Pose;
+use truebead::core::units::Mm;
 use truebead::sim::boards::{BoardStudio, Exposure};
-use truebead::units::Mm;
 
 const SIZE: [u32; 2] = [640, 480];
 

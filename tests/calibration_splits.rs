@@ -10,16 +10,17 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
-use truebead::calib::board::Board;
-use truebead::calib::covariance::Covariance;
-use truebead::calib::equations::Corner;
-use truebead::calib::plane::OnBed;
-use truebead::calib::sighting::{self, Sighting};
-use truebead::calib::{Calibration, Quality, SurfaceMap, solve};
-use truebead::frame::Channel;
+use truebead::calibration::board::Board;
+use truebead::calibration::covariance::Covariance;
+use truebead::calibration::equations::Corner;
+use truebead::calibration::plane::OnBed;
+use truebead::calibration::sighting;
+use truebead::calibration::sighting::Sighting;
+use truebead::calibration::{Calibration, Quality, SurfaceMap, solve};
+use truebead::core::frame::Channel;
+use truebead::core::time::Stamp;
+use truebead::core::units::Mm;
 use truebead::io::image_file;
-use truebead::time::Stamp;
-use truebead::units::Mm;
 
 /// OpenCV's sample pictures by both cameras of a pair.
 const SETS: [&str; 2] = ["chessboard", "chessboard_right"];

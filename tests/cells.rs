@@ -5,8 +5,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use truebead::config::Cell;
-use truebead::config::cell::{CalibrationSource, Purpose};
+use truebead::cell::Cell;
+use truebead::cell::file::{CalibrationSource, Purpose};
 use truebead::io::calibration_file;
 use truebead::vision::EdgeKind;
 

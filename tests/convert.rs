@@ -9,12 +9,12 @@ use std::path::Path;
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use nalgebra::{Rotation3, Vector3};
-use truebead::calib::board::Board;
-use truebead::calib::{Calibration, Camera, Quality, file};
-use truebead::geometry::Pose;
+use truebead::calibration::board::Board;
+use truebead::calibration::{Calibration, Camera, Quality, file};
+use truebead::core::geometry::Pose;
+use truebead::core::units::Mm;
 use truebead::io::calibration_file;
 use truebead::sim::boards::{BoardStudio, Exposure};
-use truebead::units::Mm;
 
 const SIZE: [u32; 2] = [640, 480];
 

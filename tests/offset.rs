@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use nalgebra::{Rotation3, Vector3};
-use truebead::calib::board::Board;
-use truebead::calib::{Camera, file};
-use truebead::geometry::Pose;
+use truebead::calibration::board::Board;
+use truebead::calibration::{Camera, file};
+use truebead::core::geometry::Pose;
+use truebead::core::units::Mm;
 use truebead::sim::boards::{BoardStudio, Exposure};
-use truebead::units::Mm;
 
 use common::{said, truebead};
 

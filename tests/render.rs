@@ -7,11 +7,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use truebead::calib::{Calibration, Quality};
-use truebead::config::Cell;
-use truebead::config::cell::{CalibrationSource, Purpose};
+use truebead::calibration::{Calibration, Quality};
+use truebead::cell::Cell;
+use truebead::cell::file::{CalibrationSource, Purpose};
 use truebead::io::calibration_file;
-use truebead::sim::picture::{Motion, Side, Spots};
+use truebead::scenario::image::{Motion, Side, Spots};
 use truebead::sim::scenario::Series;
 use truebead::vision::{Measurer, Method, WidthMeasurement};
 

@@ -3,9 +3,10 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail")]
 
-use truebead::sim::bead::Roughness;
-use truebead::sim::sets::{self, Set};
-use truebead::sim::studio::Studio;
+use truebead::scenario::bead::Roughness;
+use truebead::studies::accuracy::sets;
+use truebead::studies::accuracy::sets::Set;
+use truebead::studies::accuracy::studio::Studio;
 use truebead::vision::Measurer;
 
 const FRAMES: u64 = 20;

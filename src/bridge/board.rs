@@ -9,8 +9,8 @@ use opencv::calib3d::{
 use opencv::core::{Mat, MatTraitConst, Point2f, Size, Vector};
 
 use super::{BridgeError, during, grey8_mat, prepare};
-use crate::frame::Frame;
-use crate::geometry::ImagePoint;
+use crate::core::frame::Frame;
+use crate::core::geometry::ImagePoint;
 
 /// Finds the inner corners of a checkerboard, `columns` by `rows` of them, row
 /// by row \[px\]. `None` where the whole board is not in the picture.
@@ -64,13 +64,13 @@ pub fn find_any_board(frame: &Frame) -> Result<Option<(usize, usize)>, BridgeErr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calib::Camera;
-    use crate::calib::board::Board;
-    use crate::frame::Pixels;
-    use crate::geometry::Pose;
+    use crate::calibration::Camera;
+    use crate::calibration::board::Board;
+    use crate::core::frame::Pixels;
+    use crate::core::geometry::Pose;
+    use crate::core::time::Stamp;
+    use crate::core::units::Mm;
     use crate::sim::boards::{BoardStudio, Exposure};
-    use crate::time::Stamp;
-    use crate::units::Mm;
     use nalgebra::Vector3;
 
     const SIZE: [u32; 2] = [400, 300];

@@ -6,8 +6,8 @@ use opencv::core::{BORDER_DEFAULT, Mat, MatTraitConst, Rect, Size, ToInputArray,
 use opencv::imgproc::{canny, gaussian_blur, hough_lines_p};
 
 use super::{BridgeError, during, grey8_mat, prepare};
-use crate::frame::{Frame, Pixels};
-use crate::geometry::{ImagePoint, Roi};
+use crate::core::frame::{Frame, Pixels};
+use crate::core::geometry::{ImagePoint, Roi};
 
 /// Settings of the edge detector and the line finder.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -123,7 +123,7 @@ fn coordinate(px: usize) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::Stamp;
+    use crate::core::time::Stamp;
 
     const SETTINGS: EdgeSettings = EdgeSettings {
         blur_sigma_px: 1.0,

@@ -8,8 +8,8 @@ use opencv::imgproc::{
 };
 
 use super::{BridgeError, during, grey8_mat, prepare};
-use crate::frame::Frame;
-use crate::geometry::ImagePoint;
+use crate::core::frame::Frame;
+use crate::core::geometry::ImagePoint;
 
 /// Sides of the squares over which a pixel is compared with the mean \[px\]: a marker's
 /// border must be dark in one of them at least.

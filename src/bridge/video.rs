@@ -10,8 +10,8 @@ use opencv::videoio::{
 };
 
 use super::{BridgeError, during, prepare};
-use crate::frame::{Channel, Frame, Layout, Pixels};
-use crate::time::Stamp;
+use crate::core::frame::{Channel, Frame, Layout, Pixels};
+use crate::core::time::Stamp;
 
 /// Where moving pictures come from.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -13,12 +13,16 @@ use clap::Args;
 use rayon::prelude::*;
 
 use super::{Voice, WrongArguments};
-use crate::offline::accuracy::calibration::{self, RigFigures};
-use crate::offline::accuracy::{Outcome, SetFigures, markdown, table};
-use crate::offline::{Progress, output};
-use crate::sim::calibrations::{self, Bench, Rig, Source};
-use crate::sim::sets::{self, Set};
-use crate::sim::studio::Studio;
+use crate::io::progress::Progress;
+use crate::rows::output;
+use crate::studies::accuracy::calibration_table;
+use crate::studies::accuracy::calibration_table::RigFigures;
+use crate::studies::accuracy::calibrations;
+use crate::studies::accuracy::calibrations::{Bench, Rig, Source};
+use crate::studies::accuracy::sets;
+use crate::studies::accuracy::sets::Set;
+use crate::studies::accuracy::studio::Studio;
+use crate::studies::accuracy::{Outcome, SetFigures, markdown, table};
 use crate::vision::Measurer;
 
 /// Frames of a set where nothing else is said.
@@ -159,9 +163,13 @@ fn judge_calibrations(args: &AccuracyArgs, voice: Voice) -> Result<ExitCode> {
     if let Some(out) = &args.out {
         let json = serde_json::to_vec_pretty(&figures).context("calibrations.json")?;
         output::write_whole(out, "calibrations.json", &json)?;
-        output::write_whole(out, "calibrations.md", calibration::markdown(&figures).as_bytes())?;
+        output::write_whole(
+            out,
+            "calibrations.md",
+            calibration_table::markdown(&figures).as_bytes(),
+        )?;
     }
-    say!("{}", calibration::table(&figures).trim_end());
+    say!("{}", calibration_table::table(&figures).trim_end());
     let missed = figures.iter().any(|figures| !figures.missed.is_empty());
     Ok(if missed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use super::WrongArguments;
 use super::calibrate::BoardArgs;
 use crate::io::whole_file::write_whole;
-use crate::offline::sheet::{Paper, Sheet};
+use crate::report::sheet::{Paper, Sheet};
 
 /// Makes a checkerboard to print, at its true size.
 #[derive(Debug, Args)]

@@ -15,16 +15,17 @@ use rayon::prelude::*;
 
 use self::conclusion::Conclusion;
 use super::WrongArguments;
-use crate::calib::board::{Board, Marks};
-use crate::calib::dictionary::Dictionary;
-use crate::calib::refusal::Refusal;
-use crate::calib::sighting::{self, Looks, Sighting};
-use crate::frame::Channel;
-use crate::io::camera::folder::list_images;
+use crate::calibration::board::{Board, Marks};
+use crate::calibration::dictionary::Dictionary;
+use crate::calibration::refusal::Refusal;
+use crate::calibration::sighting;
+use crate::calibration::sighting::{Looks, Sighting};
+use crate::core::frame::Channel;
+use crate::core::time::Stamp;
+use crate::core::units::Mm;
+use crate::drivers::camera::folder::list_images;
 use crate::io::image_file;
 use crate::io::whole_file::write_whole;
-use crate::time::Stamp;
-use crate::units::Mm;
 
 /// Finds camera, lens and bed plane from images of a board, in a folder or taken now.
 #[derive(Debug, Args)]

@@ -10,14 +10,14 @@ use nalgebra::Point3;
 
 use super::WrongArguments;
 use super::calibrate::check_writable;
-use super::cell::{ExtruderSide, LoadedCell, beyond, steady};
-use crate::calib::Calibration;
-use crate::config::Cell;
-use crate::config::cell::{Purpose, RunPart, Source};
-use crate::config::control::WidthLaw;
+use crate::assembly::{ExtruderSide, LoadedCell, beyond, steady};
+use crate::calibration::Calibration;
+use crate::cell::Cell;
+use crate::cell::control::WidthLaw;
+use crate::cell::file::{Purpose, RunPart, Source};
+use crate::core::time::Span;
+use crate::core::units::Mm;
 use crate::extruder::start_stop::Pause;
-use crate::time::Span;
-use crate::units::Mm;
 
 /// Ratio of speeds in one cell that nobody means.
 const UNLIKELY: f64 = 200.0;
@@ -58,6 +58,9 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     // Everything that the extruder's strategy refers to, before anything is called
     // sound.
     let side = run.as_ref().map_or(Ok(None), LoadedCell::extruder)?;
+    if let Some(side) = &side {
+        super::warn(&side.warnings);
+    }
     run.as_ref().map_or(Ok(()), LoadedCell::check_sight)?;
     check_gauge(&loaded)?;
     say!("{}: sound", args.cell.display());

@@ -6,13 +6,14 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::Args;
 
-use super::cell::LoadedCell;
 use super::{Voice, WrongArguments};
-use crate::config::cell::{Purpose, RunPart};
-use crate::offline::compare::Comparison;
-use crate::offline::{Progress, output};
+use crate::assembly::LoadedCell;
+use crate::cell::file::{Purpose, RunPart};
+use crate::core::units::Mm;
+use crate::io::progress::Progress;
+use crate::report::compare::Comparison;
+use crate::rows::output;
 use crate::sim::compare::{Contender, Figures};
-use crate::units::Mm;
 
 /// Most controllers: as many as there are colours.
 const MOST: usize = 6;

@@ -8,12 +8,12 @@ use clap::{Args, ValueEnum};
 
 use super::calibrate::{check_writable, parse_board, parse_dictionary, parse_length, parse_square};
 use super::{Voice, WrongArguments};
-use crate::calib::dictionary::Dictionary;
-use crate::calib::exchange::{Import, Intrinsics, opencv, ros};
-use crate::calib::{Calibration, Quality};
+use crate::calibration::dictionary::Dictionary;
+use crate::calibration::exchange::{Import, Intrinsics, opencv, ros};
+use crate::calibration::{Calibration, Quality};
+use crate::core::units::Mm;
 use crate::io::calibration_file;
 use crate::io::whole_file::write_whole;
-use crate::units::Mm;
 
 /// Converts a calibration to ROS's `camera_info` or OpenCV's YAML, or from them.
 #[derive(Debug, Args)]

@@ -7,14 +7,14 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::Args;
 
-use super::cell::LoadedCell;
 use super::{Voice, outcome, run};
-use crate::config::cell::Purpose;
+use crate::assembly::LoadedCell;
+use crate::cell::file::Purpose;
+use crate::core::time::Span;
+use crate::core::units::{Mm, MmPerS};
 use crate::io::clock::RunClock;
-use crate::io::robot_sim::{RobotSim, SimOptions};
 use crate::link::{Job, RobotParams};
-use crate::time::Span;
-use crate::units::{Mm, MmPerS};
+use crate::simulators::robot::{RobotSim, SimOptions};
 
 /// The cell, as it is shipped.
 const CELL: &str = include_str!("../../cells/demo.toml");

@@ -7,10 +7,10 @@ use clap::{Args, Subcommand};
 
 use super::WrongArguments;
 use super::outcome::refuse_replacing;
+use crate::core::quantity::{Quantity, Unit};
 use crate::identify::excitation::{Excitation, Shape};
 use crate::identify::number::short;
 use crate::identify::profile::{Profile, file};
-use crate::identify::quantity::{Quantity, Unit};
 use crate::io::whole_file::write_whole;
 
 /// Levels held for less are a slip of the unit \[s\].

@@ -10,12 +10,12 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use super::WrongArguments;
-use super::cell::LoadedCell;
-use crate::config::cell::{ExtruderPart, Purpose};
+use crate::assembly::LoadedCell;
+use crate::cell::file::{ExtruderPart, Purpose};
+use crate::core::time::{Span, Stamp};
 use crate::io::clock::RunClock;
-use crate::io::extruder_sim::{ExtruderOptions, ExtruderSim};
 use crate::link::extruder::ExtruderHello;
-use crate::time::{Span, Stamp};
+use crate::simulators::extruder::{ExtruderOptions, ExtruderSim};
 
 /// Times between two STATE lines that an extruder may have [s].
 const STATE_PERIODS_S: (f64, f64) = (0.005, 0.2);

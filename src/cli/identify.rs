@@ -21,10 +21,10 @@ use self::options::{Columns, parse_dead_time, parse_forms, parse_hampel, parse_s
 use super::outcome::free_folder;
 use crate::identify::file::{Setting, to_toml};
 use crate::identify::fit::{DeadTime, Structure};
-use crate::identify::hampel::Hampel;
-use crate::identify::savgol::SavGol;
-use crate::offline::identify::{Study, page, study, text, to_json};
-use crate::offline::output::{make_folder, write_whole};
+use crate::numeric::hampel::Hampel;
+use crate::numeric::savgol::SavGol;
+use crate::report::identify::{Study, page, study, text, to_json};
+use crate::rows::output::{make_folder, write_whole};
 
 /// Dead times are looked for up to this share of the record…
 const DEAD_TIME_SHARE: f64 = 0.125;

@@ -7,9 +7,9 @@ use anyhow::Result;
 use clap::Args;
 
 use super::WrongArguments;
+use crate::core::quantity::Unit;
 use crate::identify::file::ModelFile;
 use crate::identify::library::{Entry, Library, TOLERANCE_C, Wanted};
-use crate::identify::quantity::Unit;
 use crate::io::model_file::{Folder, read, read_library};
 
 /// Lists a folder of models, or tells which of them a cell would use.

@@ -12,7 +12,7 @@ use clap::{ArgMatches, Args, Command, FromArgMatches};
 
 use super::WrongArguments;
 use super::calibrate::{BoardArgs, parse_length};
-use crate::units::Mm;
+use crate::core::units::Mm;
 
 /// What an MCAP file begins with.
 const MCAP: &[u8] = b"\x89MCAP0\r\n";

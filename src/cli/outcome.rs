@@ -5,7 +5,8 @@ use std::process::ExitCode;
 
 use super::{WITH_LOSS, WrongArguments};
 use crate::live::{Ending, LiveReport};
-use crate::offline::{Summary, names};
+use crate::rows::names;
+use crate::rows::summary::Summary;
 
 /// A folder name that is free: the name itself, or with the first number that
 /// is.

@@ -13,9 +13,9 @@ use super::WrongArguments;
 use cell::Extruder;
 use job::Bead;
 
-use crate::offline::output;
-use crate::offline::planned::{PlannedBead, page, rms, to_csv};
 use crate::plan::{Foretold, PlanError, Task, Unplanned, attainable, gcode, solve};
+use crate::report::planned::{PlannedBead, page, rms, to_csv};
+use crate::rows::output;
 
 /// Plans the robot's speed and the extruder's command together, ahead of a job.
 ///

@@ -9,18 +9,22 @@ use anyhow::Context;
 use clap::Args;
 use crossbeam_channel::{Sender, bounded};
 
-use super::cell::LoadedCell;
 use super::{Voice, WITH_LOSS, WrongArguments};
-use crate::config::cell::Purpose;
-use crate::control::target::Target;
-use crate::io::camera::mcap::RobotZ;
-use crate::io::camera::open::{self, OfflineOptions};
+use crate::assembly::LoadedCell;
+use crate::cell::file::Purpose;
+use crate::drivers::camera::mcap::RobotZ;
+use crate::drivers::camera::open;
+use crate::drivers::camera::open::OfflineOptions;
+use crate::io::progress::Progress;
 use crate::io::stop::StopSignal;
-use crate::offline::{
-    EdgesWriter, FrameRow, LogOptions, Note, OverlayWriter, Progress, RunLog, Summary,
-};
-use crate::ports::{FrameSource, Grab, SourceError};
+use crate::report::overlays::OverlayWriter;
+use crate::rows::edges::EdgesWriter;
+use crate::rows::frame_row::FrameRow;
+use crate::rows::log::{LogOptions, RunLog};
+use crate::rows::summary::{Note, Summary};
+use crate::run::ports::{FrameSource, Grab, SourceError};
 use crate::vision::{Measurer, Reject, RoughnessEstimator};
+use crate::width_control::target::Target;
 
 /// Frames that may wait between reading and measuring.
 const WAITING: usize = 8;

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::WrongArguments;
-use crate::calib::{Calibration, file};
-use crate::config::Cell;
-use crate::config::cell::{CalibrationSource, Purpose};
+use crate::calibration::{Calibration, file};
+use crate::cell::Cell;
+use crate::cell::file::{CalibrationSource, Purpose};
 use crate::io::recording::Recording;
 
 /// The cell of a recording and its calibration, as they were in the run.

@@ -10,12 +10,12 @@ use clap::Args;
 use image::{ExtendedColorType, ImageEncoder, codecs::png};
 use rayon::prelude::*;
 
-use super::cell::LoadedCell;
 use super::{Voice, WrongArguments};
-use crate::config::Cell;
-use crate::config::cell::{CalibrationSource, Purpose};
-use crate::frame::Frame;
-use crate::offline::Progress;
+use crate::assembly::LoadedCell;
+use crate::cell::Cell;
+use crate::cell::file::{CalibrationSource, Purpose};
+use crate::core::frame::Frame;
+use crate::io::progress::Progress;
 use crate::sim::scenario::Series;
 use crate::sim::truth::Truth;
 

@@ -9,14 +9,14 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::WrongArguments;
-use super::cell::extruder;
 use super::recorded::attached;
-use crate::config::cell::{ExtruderPart, Purpose};
-use crate::control::Step;
-use crate::controller::{Controller, Setup};
+use crate::assembly::extruder;
+use crate::cell::file::{ExtruderPart, Purpose};
+use crate::control::{Controller, Setup};
 use crate::io::record::ExtruderFile;
 use crate::io::recording::{Entry, Recording};
-use crate::offline::replay::{Difference, ReplayReport, replay};
+use crate::run::replay::{Difference, ReplayReport, replay};
+use crate::width_control::Step;
 
 /// Exit status of a replay that had to end before the recording did.
 const RECORDS_LOST: u8 = 3;

@@ -8,9 +8,10 @@ use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
 use super::Voice;
-use crate::offline::reproduce::summary::Summary;
-use crate::offline::reproduce::{Effort, Reproduced, Row, Source, page, table};
-use crate::offline::{Progress, output};
+use crate::io::progress::Progress;
+use crate::rows::output;
+use crate::studies::reproduce::summary::Summary;
+use crate::studies::reproduce::{Effort, Reproduced, Row, Source, page, table};
 
 /// Runs the experiments of a source paper beside its published numbers.
 #[derive(Debug, Args)]

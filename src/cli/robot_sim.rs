@@ -8,11 +8,11 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use super::WrongArguments;
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm, MmPerS, MmPerS2, NotFinite};
 use crate::io::clock::RunClock;
-use crate::io::robot_sim::{RobotSim, SimError, SimOptions};
 use crate::link::{Job, RobotParams};
-use crate::time::{Span, Stamp};
-use crate::units::{Mm, MmPerS, MmPerS2, NotFinite};
+use crate::simulators::robot::{RobotSim, SimError, SimOptions};
 
 /// A robot that answers the robot link: velocity loop, its own speed limits,
 /// setpoints that run out.

@@ -6,16 +6,16 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::Args;
 
-use super::cell::{LoadedCell, beyond};
 use super::{Voice, WrongArguments, outcome};
-use crate::config::cell::{Purpose, RunPart};
-use crate::control::target::Target;
+use crate::assembly::{LoadedCell, beyond};
+use crate::cell::file::{Purpose, RunPart};
+use crate::core::time::Span;
 use crate::io::clock::RunClock;
 use crate::io::record::{ExtruderFile, RecordConfig};
 use crate::io::stop::StopSignal;
 use crate::live::{self, LiveExtruder, LiveReport, LiveRun};
-use crate::offline::{ControlFacts, LogOptions, RunLog};
-use crate::time::Span;
+use crate::rows::log::{ControlFacts, LogOptions, RunLog};
+use crate::width_control::target::Target;
 
 /// Runs the live cell: measures, controls the robot's speed, records.
 #[derive(Debug, Args)]
@@ -164,8 +164,7 @@ fn live_extruder(
         ))
         .into());
     };
-    if let Some(words) = beyond(part, &side)? {
-        tell!("warning: {words}");
-    }
+    super::warn(&side.warnings);
+    super::warn(beyond(part, &side)?.as_slice());
     Ok((Some(LiveExtruder { setup: side.setup, demand: part.demand, link }), side.files))
 }

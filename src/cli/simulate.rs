@@ -8,20 +8,22 @@ use std::time::Instant;
 use anyhow::Context;
 use clap::Args;
 
-use super::cell::LoadedCell;
 use super::{Voice, WITH_LOSS, outcome};
-use crate::config::cell::{KeepFrames, Purpose};
-use crate::control::target::Target;
-use crate::control::{Event, Step};
+use crate::assembly::LoadedCell;
+use crate::cell::file::{KeepFrames, Purpose};
+use crate::core::time::Stamp;
+use crate::core::units::{Mm, Mm3PerS};
+use crate::io::progress::Progress;
 use crate::io::record::{self, RecordConfig, RecorderHandle};
 use crate::io::stop::StopSignal;
-use crate::offline::{
-    ControlColumns, ControlFacts, FrameRow, LogError, LogOptions, Note, Progress, RunLog,
-};
-use crate::ports::{RecordError, Recorder};
+use crate::rows::frame_row::{ControlColumns, FrameRow};
+use crate::rows::log::{ControlFacts, LogOptions, RunLog};
+use crate::rows::output::LogError;
+use crate::rows::summary::Note;
+use crate::run::ports::{RecordError, Recorder};
 use crate::sim::cell::{LayerEnd, Sight, SimCell, Witness};
-use crate::time::Stamp;
-use crate::units::{Mm, Mm3PerS};
+use crate::width_control::target::Target;
+use crate::width_control::{Event, Step};
 
 /// Runs the closed loop on a simulated cell.
 #[derive(Debug, Args)]
@@ -58,7 +60,7 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
         loaded.cell.simulation.seed = seed;
     }
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
-    let extruder = loaded.simulated_extruder()?;
+    let extruder = super::simulated_extruder(&loaded)?;
     let law = extruder.as_ref().map(|rig| rig.setup.law.clone());
     let calibration = loaded.calibration.clone();
     let recorder = SimRecorder::of(args.record.then_some(&args.out), &loaded)?;
@@ -138,7 +140,7 @@ impl Recorder for SimRecorder {
     }
 }
 
-fn status(loaded: &LoadedCell, summary: &crate::offline::Summary, end: LayerEnd) -> ExitCode {
+fn status(loaded: &LoadedCell, summary: &crate::rows::summary::Summary, end: LayerEnd) -> ExitCode {
     if !end.whole {
         tell!("error: the robot stopped before the end of the bead; the report says why");
         return ExitCode::FAILURE;

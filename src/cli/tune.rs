@@ -10,14 +10,14 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 
-use super::cell::LoadedCell;
 use super::offset::recording::farthest;
 use super::{Voice, WrongArguments};
-use crate::config::cell::Purpose;
-use crate::config::control::STEP_SHARES;
-use crate::offline::output;
-use crate::offline::tuned::Tuned;
-use crate::units::Mm;
+use crate::assembly::LoadedCell;
+use crate::cell::control::STEP_SHARES;
+use crate::cell::file::Purpose;
+use crate::core::units::Mm;
+use crate::report::tuned::Tuned;
+use crate::rows::output;
 
 /// Finds what a cell is like from steps of its speed, and proposes settings.
 #[derive(Debug, Args)]

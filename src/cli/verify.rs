@@ -8,10 +8,10 @@ use clap::Args;
 
 use super::WrongArguments;
 use super::calibrate::{BoardArgs, check_size, look_at, parse_length};
-use crate::calib::Calibration;
-use crate::calib::verify::{Findings, verify};
+use crate::calibration::Calibration;
+use crate::calibration::verify::{Findings, verify};
+use crate::core::units::Mm;
 use crate::io::calibration_file;
-use crate::units::Mm;
 
 /// Largest error of a width that is borne unless another is given \[%\].
 const MOST_PERCENT: f64 = 0.2;

@@ -24,7 +24,7 @@ mod tests;
 pub use gains::{Adaptation, GainError, Gains, Safety, ScalarPlant};
 pub use law::{Action, AdaptiveLaw, RampErrors};
 
-use crate::time::Span;
+use crate::core::time::Span;
 
 /// The plant of eqs. (6), (7) with constant parameters: v̄1 \[m/s\] in the
 /// nozzle, ū3 \[m/s\] of the strand, ṁ \[kg/s\], `U_s` \[m/s\].

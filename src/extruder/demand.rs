@@ -1,6 +1,6 @@
 //! The flow that is wanted at the nozzle.
 
-use crate::units::{Mm, Mm2, Mm3PerS, MmPerS};
+use crate::core::units::{Mm, Mm2, Mm3PerS, MmPerS};
 
 /// Most by which a robot that moves faster than it was told raises the flow.
 const MOST: f64 = 1.5;

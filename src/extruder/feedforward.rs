@@ -28,7 +28,7 @@ pub use observer::{FlowObserver, FlowResidual, UnmodelledFlow, share_left};
 pub use tracker::Tracker;
 
 use super::limits::LimitError;
-use crate::model::{ModelError, TransferFunction};
+use crate::numeric::lti::{ModelError, TransferFunction};
 
 /// A feedforward that cannot be set up.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -15,8 +15,8 @@ pub use screw::ScrewFill;
 
 use super::limits::CommandLimit;
 use super::report::ExtruderReport;
-use crate::time::{Span, Stamp};
-use crate::units::Mm3PerS;
+use crate::core::time::{Span, Stamp};
+use crate::core::units::Mm3PerS;
 
 /// A reading that a law cannot do without.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::time::Span;
+use crate::core::time::Span;
 
 /// What a command may be, in the unit of the extruder's command.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -15,8 +15,8 @@
 //! these two calls and never leaves its [`super::limits::CommandLimits`] \[rpm\].
 
 use super::limits::{CommandLimit, LimitError};
-use crate::time::{Span, Stamp};
-use crate::units::{MPa, Rpm};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{MPa, Rpm};
 
 pub mod bank;
 pub mod belief;

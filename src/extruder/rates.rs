@@ -1,7 +1,7 @@
 //! Several rates in one loop: each says when it is due, and none waits for
 //! another.
 
-use crate::time::{Span, Stamp};
+use crate::core::time::{Span, Stamp};
 
 /// Something that is done at a fixed rate. Times that were missed are left
 /// out, not made up for.

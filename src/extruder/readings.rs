@@ -4,9 +4,9 @@
 //! the readings as they come.
 
 use super::report::ExtruderReport;
-use crate::identify::hampel::{Hampel, LiveHampel};
-use crate::identify::savgol::{LiveSavGol, SavGol};
-use crate::units::{MPa, Mm, Mm3PerS};
+use crate::core::units::{MPa, Mm, Mm3PerS};
+use crate::numeric::hampel::{Hampel, LiveHampel};
+use crate::numeric::savgol::{LiveSavGol, SavGol};
 
 /// Which filters readings pass, in this order; by default none.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -90,9 +90,9 @@ impl Passage {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::core::units::Rpm;
     use crate::extruder::PumpMode;
     use crate::sim::hash::{mix, normal_pair};
-    use crate::units::Rpm;
 
     fn report(mpa: f64) -> ExtruderReport {
         ExtruderReport {

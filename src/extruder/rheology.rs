@@ -3,7 +3,7 @@
 //! power law the pressure, the screw's drag flow its speed. Each both ways.
 //! Ma et al. 2026, eqs. (1) to (5).
 
-use crate::units::{MPa, Mm, Mm3PerS, Rpm};
+use crate::core::units::{MPa, Mm, Mm3PerS, Rpm};
 
 /// A bead, a law or a quantity that cannot be.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -141,8 +141,8 @@ fn not_negative(what: &'static str, found: f64) -> Result<(), RheologyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::core::units::MmPerS;
     use crate::extruder::demand;
-    use crate::units::MmPerS;
     use proptest::prelude::*;
 
     const WIDTH: Mm = Mm::constant(3.0);

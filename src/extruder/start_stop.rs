@@ -21,14 +21,13 @@
 
 mod begin;
 mod end;
-mod parameters;
 
 pub use begin::{Pause, Start};
 pub use end::Stop;
-pub use parameters::{StartStop, StartStopError};
 
-use crate::time::Span;
-use crate::units::{Mm3PerS, MmPerS};
+use crate::core::time::Span;
+use crate::core::units::{Mm3PerS, MmPerS};
+use crate::identify::start_stop::parameters::{StartStop, StartStopError};
 
 /// What is laid between a start and a stop.
 #[derive(Debug, Clone, Copy, PartialEq)]

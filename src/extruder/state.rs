@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::limits::CommandLimit;
-use crate::units::Mm3PerS;
+use crate::core::units::Mm3PerS;
 
 /// Why the last command is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -25,11 +25,11 @@ use super::readings::{ReadingFilters, Readings};
 use super::report::{ExtruderCommand, ExtruderReport};
 use super::start_stop::Timing;
 use super::state::{ExtruderFault, ExtruderHold, ExtruderState, ExtruderTrace};
+use super::trajectory::PlannedJob;
 use super::{Drive, RobotFollows};
-use crate::control::follow::Follow;
-use crate::plan::PlannedJob;
-use crate::time::{Span, Stamp};
-use crate::units::{MPa, Mm, Mm3PerS, MmPerS};
+use crate::core::readback::Follow;
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{MPa, Mm, Mm3PerS, MmPerS};
 use pause::{Pauses, Shares};
 
 /// Most by which a robot that follows the flow is quickened.

@@ -2,7 +2,7 @@
 //! a frequency response with their standard deviations, by the derivatives
 //! after each parameter.
 
-use crate::model::{FirstOrder, ModelError, SecondOrder, TransferFunction, simulate};
+use crate::numeric::lti::{FirstOrder, ModelError, SecondOrder, TransferFunction, simulate};
 
 use super::fit::{DeadTime, Fit, Structure};
 

@@ -2,10 +2,10 @@
 
 mod write;
 
+use crate::core::quantity::{Quantity, Unit};
 use crate::document::Problems;
 use crate::document::{Document, Table};
-use crate::identify::quantity::{Quantity, Unit};
-use crate::model::TransferFunction;
+use crate::numeric::lti::TransferFunction;
 
 pub use self::write::to_toml;
 pub(super) use self::write::{number, put, put_setting, row};

@@ -53,7 +53,7 @@ pub use samples::{Samples, SamplesError};
 pub use settings::{Before, DeadTime, Level, Settings, Structure};
 pub use trend::{DOMINATES, Trend};
 
-use crate::model::Between;
+use crate::numeric::lti::Between;
 use problem::Problem;
 
 /// Most poles of a fit.

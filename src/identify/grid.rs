@@ -103,7 +103,7 @@ impl Grid {
 /// The median step.
 pub fn usual_step(time_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    crate::vision::rank::median(&mut steps)
+    crate::numeric::rank::median(&mut steps)
 }
 
 #[expect(clippy::cast_precision_loss, reason = "counts of samples")]

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::file::ModelFile;
-use super::quantity::Unit;
+use crate::core::quantity::Unit;
 
 /// Nozzles that differ by less are the same \[mm\].
 const SAME_NOZZLE_MM: f64 = 0.005;
@@ -200,9 +200,9 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
     use super::*;
+    use crate::core::quantity::Quantity;
     use crate::identify::file::Setting;
-    use crate::identify::quantity::Quantity;
-    use crate::model::TransferFunction;
+    use crate::numeric::lti::TransferFunction;
 
     fn entry(
         name: &str,

@@ -17,13 +17,14 @@ mod error;
 mod fall;
 pub mod file;
 mod least;
+pub mod parameters;
 mod rise;
 mod void;
 
 pub use error::StartStopFitError;
 
-use crate::extruder::start_stop::StartStop;
 use crate::identify::series::Series;
+use parameters::StartStop;
 
 /// A start as it was seen.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use crate::calib::exchange::{self, Import};
-use crate::calib::{Calibration, file};
+use crate::calibration::exchange;
+use crate::calibration::exchange::Import;
+use crate::calibration::{Calibration, file};
 use crate::document::Problems;
 
 /// Bytes of a camera in the YAML of others, at most.

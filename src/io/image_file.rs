@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat, ImageReader};
 
-use crate::frame::{Channel, Frame, Layout, Pixels, WrongSize};
-use crate::time::Stamp;
+use crate::core::frame::{Channel, Frame, Layout, Pixels, WrongSize};
+use crate::core::time::Stamp;
 
 /// Endings of the file names that are taken for images, without the dot and in
 /// lower case.

@@ -3,7 +3,7 @@
 
 use std::str::Split;
 
-use crate::units::{Mm, MmPerS, NotFinite};
+use crate::core::units::{Mm, MmPerS, NotFinite};
 
 /// Largest magnitude that is written; three such numbers still fit a line.
 const LARGEST: f64 = 999_999_999_999.0;

@@ -2,7 +2,7 @@
 
 use super::VERSION;
 use super::fields::{Fields, LineError, decimal};
-use crate::units::MmPerS;
+use crate::core::units::MmPerS;
 
 const KEYWORDS: &str = "HELLO, SPEED, STOP or BYE";
 

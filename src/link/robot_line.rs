@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::fields::{Fields, LineError, decimal, printing};
 use super::{MAX_LINE, VERSION};
-use crate::control::{RobotLimits, RobotMode, RobotState};
+use crate::width_control::{RobotLimits, RobotMode, RobotState};
 
 const KEYWORDS: &str = "HELLO, STATE or ERR";
 /// Longest name that still fits a line beside three numbers.
@@ -169,8 +169,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::core::units::{Mm, MmPerS};
     use crate::link::on_wire;
-    use crate::units::{Mm, MmPerS};
 
     #[test]
     fn the_lines_of_the_contract_are_understood() {

@@ -8,15 +8,15 @@ use std::thread::{Builder, JoinHandle};
 use crossbeam_channel::{Receiver, Sender, unbounded};
 
 use super::mailbox::Mailbox;
-use crate::calib::Calibration;
-use crate::config::Cell;
-use crate::frame::Frame;
-use crate::geometry::ImagePoint;
+use crate::calibration::Calibration;
+use crate::cell::Cell;
+use crate::core::frame::Frame;
+use crate::core::geometry::ImagePoint;
+use crate::core::time::Stamp;
+use crate::core::units::Mm;
 use crate::io::clock::RunClock;
 use crate::io::record::FrameTap;
-use crate::ports::{FrameSource, Grab};
-use crate::time::Stamp;
-use crate::units::Mm;
+use crate::run::ports::{FrameSource, Grab};
 use crate::vision::{Measurer, Reject, Roughness, RoughnessEstimator, WidthMeasurement};
 
 /// What the measurement needs to know of the cell.
@@ -164,7 +164,7 @@ fn measure_frames(mailbox: &Mailbox<Taken>, optics: &Optics, tap: &FrameTap, tel
 }
 
 impl Optics {
-    fn surface(&self) -> crate::calib::SurfaceMap {
+    fn surface(&self) -> crate::calibration::SurfaceMap {
         let z = Mm::new(f64::from_bits(self.robot_z.load(Ordering::Relaxed))).ok();
         self.cell.surface(&self.calibration, z)
     }

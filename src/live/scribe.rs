@@ -8,12 +8,15 @@ use std::thread::{Builder, JoinHandle};
 use crossbeam_channel::{Receiver, Sender, unbounded};
 
 use super::latency::Latency;
-use crate::control::{Event, Step};
-use crate::frame::Frame;
-use crate::geometry::ImagePoint;
-use crate::offline::{FrameRow, LogError, Note, RunLog, Summary};
-use crate::time::Stamp;
+use crate::core::frame::Frame;
+use crate::core::geometry::ImagePoint;
+use crate::core::time::Stamp;
+use crate::rows::frame_row::FrameRow;
+use crate::rows::log::RunLog;
+use crate::rows::output::LogError;
+use crate::rows::summary::{Note, Summary};
 use crate::vision::Edges;
+use crate::width_control::{Event, Step};
 
 /// Pictures that may wait for the log; beyond, rows go without theirs.
 const WAITING_PICTURES: usize = 16;

@@ -1,7 +1,7 @@
 //! The extruder ahead of time: flow and volume for a command whose knots lie evenly and
 //! between which it runs straight.
 
-use crate::model::{Between, ModelError, Simulator, TransferFunction};
+use crate::numeric::lti::{Between, ModelError, Simulator, TransferFunction};
 
 /// Grid on which the flow is known \[s\]. Between two ticks it is taken for straight.
 pub const TICK_S: f64 = 0.005;

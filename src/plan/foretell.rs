@@ -4,8 +4,8 @@
 use super::extruder::{Course, TICK_S, float, follow, whole};
 use super::profile::SpeedProfile;
 use super::solve::{AlongPath, PlanError, Task};
-use crate::model::ModelError;
-use crate::time::Span;
+use crate::core::time::Span;
+use crate::numeric::lti::ModelError;
 
 /// Distance of the places for which the width is foretold, in lengths of the nozzle.
 const EVERY: f64 = 0.05;
@@ -87,7 +87,7 @@ mod tests {
 
     use super::*;
     use crate::extruder::limits::CommandLimits;
-    use crate::model::TransferFunction;
+    use crate::numeric::lti::TransferFunction;
     use crate::plan::{Bead, Limits, RobotLimits, Unmodelled};
 
     #[test]

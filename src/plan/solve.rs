@@ -6,7 +6,7 @@ use super::limits::attainable;
 use super::long::Long;
 use super::profile::{ProfileError, SpeedProfile};
 use crate::extruder::limits::CommandLimits;
-use crate::model::{ModelError, TransferFunction};
+use crate::numeric::lti::{ModelError, TransferFunction};
 
 /// What the robot can do along a path.
 #[derive(Debug, Clone, Copy, PartialEq)]

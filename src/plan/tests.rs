@@ -4,7 +4,7 @@
 
 use super::*;
 use crate::extruder::limits::CommandLimits;
-use crate::model::TransferFunction;
+use crate::numeric::lti::TransferFunction;
 
 const ACCEL: f64 = 2000.0;
 

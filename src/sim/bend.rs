@@ -3,7 +3,7 @@
 
 use nalgebra::Vector2;
 
-use super::picture;
+use crate::scenario::image;
 
 /// Angle from the middle of the gauge beyond which an arc is not followed
 /// \[rad\]: its edges are functions of the place along the gauge's axis.
@@ -29,7 +29,7 @@ pub enum Bend {
 
 impl Bend {
     /// As a picture asks for it.
-    pub fn new(asked: &picture::Bend) -> Self {
+    pub fn new(asked: &image::Bend) -> Self {
         if asked.radius_mm != 0.0 {
             Self::Arc { radius_mm: asked.radius_mm }
         } else if asked.corner_deg != 0.0 {
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     fn arc(radius_mm: f64) -> Bend {
-        Bend::new(&picture::Bend { radius_mm, corner_deg: 0.0 })
+        Bend::new(&image::Bend { radius_mm, corner_deg: 0.0 })
     }
 
     #[test]
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn both_halves_of_a_corner_have_the_width_normal_to_themselves() {
-        let bend = Bend::new(&picture::Bend { radius_mm: 0.0, corner_deg: 40.0 });
+        let bend = Bend::new(&image::Bend { radius_mm: 0.0, corner_deg: 40.0 });
         for sign in [1.0, -1.0] {
             let [a, b, c] = [(3.0, 2.0), (9.0, 2.0), (5.0, -2.0)]
                 .map(|(along, across)| bend.place(sign * along, across).unwrap());

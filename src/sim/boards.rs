@@ -3,12 +3,12 @@
 use nalgebra::{Matrix3, Point2, Vector2};
 
 use super::hash;
-use super::normal;
-use crate::calib::Camera;
-use crate::calib::board::Board;
-use crate::frame::{Frame, Pixels, WrongSize};
-use crate::geometry::Pose;
-use crate::time::Stamp;
+use crate::calibration::Camera;
+use crate::calibration::board::Board;
+use crate::core::frame::{Frame, Pixels, WrongSize};
+use crate::core::geometry::Pose;
+use crate::core::time::Stamp;
+use crate::numeric::normal_distribution;
 
 /// Grey values of a board's black and white squares and of what lies around it.
 const BLACK: f64 = 40.0;
@@ -228,7 +228,7 @@ impl Scene {
 /// Share of a blurred half plane.
 fn step(inside: f64, blur: f64) -> f64 {
     // The tails beyond are less than a part in 10¹⁵, and slow.
-    normal::cumulative((inside / blur).clamp(-FLAT, FLAT))
+    normal_distribution::cumulative((inside / blur).clamp(-FLAT, FLAT))
 }
 
 /// Stripes of width 1 and values 1 and -1, 1 from 0 to 1, blurred.
@@ -241,8 +241,8 @@ fn wave((at, blur): (f64, f64)) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calib::sighting;
-    use crate::units::Mm;
+    use crate::calibration::sighting;
+    use crate::core::units::Mm;
     use nalgebra::Vector3;
 
     const CAMERA: Camera = Camera {

@@ -8,17 +8,17 @@ mod clock;
 mod port;
 mod witness;
 
-use crate::calib::Calibration;
-use crate::config::Cell;
-use crate::config::cell::RunPart;
-use crate::control::{Command, Event, RobotMode};
-use crate::controller::{Controller, Setup};
+use crate::calibration::Calibration;
+use crate::cell::Cell;
+use crate::cell::file::RunPart;
+use crate::control::{Controller, Setup};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm, Mm3PerS, MmPerS, MmPerS2};
 use crate::extruder::{ExtruderSetup, ExtruderState, FlowDemand};
 use crate::link::{ParamError, RobotCell, RobotParams};
-use crate::ports::Recorder;
-use crate::runner::{Handled, Runner};
-use crate::time::{Span, Stamp};
-use crate::units::{Mm, Mm3PerS, MmPerS, MmPerS2};
+use crate::run::ports::Recorder;
+use crate::run::runner::{Handled, Runner};
+use crate::width_control::{Command, Event, RobotMode};
 
 use super::extruder::SimExtruder;
 use super::hash;

@@ -6,10 +6,10 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::cell::SimError;
 use super::score::{AlongBead, mean, median};
 use super::trial::Trial;
-use crate::calib::Calibration;
-use crate::config::cell::{Cell, RunPart};
-use crate::control::target::Target;
-use crate::units::Mm;
+use crate::calibration::Calibration;
+use crate::cell::file::{Cell, RunPart};
+use crate::core::units::Mm;
+use crate::width_control::target::Target;
 
 /// Way after control began from which errors count \[mm\].
 pub const JUDGED_AFTER_MM: f64 = 30.0;
@@ -161,12 +161,12 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::config::cell::Purpose;
+    use crate::cell::file::Purpose;
 
     fn contender(name: &str, text: &str) -> Contender {
         let cell = Cell::parse(Path::new(name), text, Purpose::Run).unwrap();
         let run = cell.run.clone().unwrap();
-        let calibration = crate::sim::barjuei2022::scale();
+        let calibration = crate::studies::barjuei2022::scale();
         Contender { name: name.into(), cell, run, calibration }
     }
 

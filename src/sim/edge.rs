@@ -7,7 +7,7 @@
 //! G of Φ, divided by a·b. Where a or b is small the difference cancels, and a
 //! series in that one goes before it.
 
-use super::normal::{cumulative, density, first_integral, second_integral};
+use crate::numeric::normal_distribution::{cumulative, density, first_integral, second_integral};
 
 /// Blur below which an edge counts as sharp \[px\].
 const SHARP_PX: f64 = 1e-6;

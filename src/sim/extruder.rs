@@ -1,12 +1,12 @@
 //! The simulated extruder: a pump that starts and stops with delays, a shut-off
 //! valve, and behind them a plant that turns commands into flow.
 
-use crate::config::extruder::{ExtruderPlant, PlantKind};
+use crate::cell::extruder::{ExtruderPlant, PlantKind};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::Mm3PerS;
 use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
-use crate::model::ModelError;
-use crate::ports::ExtruderPort;
-use crate::time::{Span, Stamp};
-use crate::units::Mm3PerS;
+use crate::numeric::lti::ModelError;
+use crate::run::ports::ExtruderPort;
 
 mod filled;
 mod linear;
@@ -165,8 +165,8 @@ impl ExtruderPort for SimExtruder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::extruder::LinearPlant;
-    use crate::model::TransferFunction;
+    use crate::cell::extruder::LinearPlant;
+    use crate::numeric::lti::TransferFunction;
 
     fn extruder() -> SimExtruder {
         let delays = Delays {

@@ -1,12 +1,12 @@
 //! Lays a simulated bead behind a robot that reports where it is.
 
-use super::bead::{BeadModel, Roughness};
-use super::disturbance::Flow;
 use super::hash;
 use super::laid::LaidBead;
-use crate::control::{RobotMode, RobotState};
-use crate::time::{Span, Stamp};
-use crate::units::Mm;
+use crate::core::time::{Span, Stamp};
+use crate::core::units::Mm;
+use crate::scenario::bead::{BeadModel, Roughness};
+use crate::scenario::disturbance::Flow;
+use crate::width_control::{RobotMode, RobotState};
 
 /// Longest stretch between two reports that is still taken for one bead
 /// \[mm\]: a robot that was connected in the middle of its bead, or was not
@@ -126,7 +126,7 @@ fn bead_of(recipe: &Recipe, number: u64) -> LaidBead {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::MmPerS;
+    use crate::core::units::MmPerS;
 
     fn follower() -> Follower {
         Follower::new(Recipe {

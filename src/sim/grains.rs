@@ -6,8 +6,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::contour::{Contour, clamp, whole};
 use super::discs::{Disc, Mask};
-use super::picture::Grains;
 use super::shade::Shape;
+use crate::scenario::image::Grains;
 
 /// Discs whose centres lie within a radius of an edge, at random places, until
 /// they cover each edge on the share of the rows that was asked for.

@@ -1,9 +1,9 @@
 //! The bead as it has been laid: where its edges lie, along the path.
 
-use super::bead::{BeadModel, Roughness};
-use super::disturbance::Flow;
 use super::wander::Wander;
 use super::waviness::Waviness;
+use crate::scenario::bead::{BeadModel, Roughness};
+use crate::scenario::disturbance::Flow;
 
 /// Coarsest grid along the path on which a bead is kept \[mm\].
 const COARSEST_MM: f64 = 0.5;

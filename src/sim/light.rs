@@ -1,7 +1,7 @@
 //! Light that grows evenly across the picture.
 
 use super::contour::whole;
-use super::picture::Picture;
+use crate::scenario::image::Picture;
 
 /// Light of every pixel; 1 in the middle of the picture.
 #[derive(Debug, Clone, Copy)]

@@ -6,7 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::identify::excitation::{Excitation, ExcitationError, Shape};
-use crate::model::{Between, ModelError, SecondOrder, Simulator, TransferFunction};
+use crate::numeric::lti::{Between, ModelError, SecondOrder, Simulator, TransferFunction};
 
 /// From sample to sample \[s\].
 pub const STEP_S: f64 = 0.02;

@@ -1,6 +1,6 @@
 //! Motion while the shutter is open: the mean of the picture over its places.
 
-use super::picture::Motion;
+use crate::scenario::image::Motion;
 
 /// Most places that a mean is taken over.
 const MOST: u32 = 64;

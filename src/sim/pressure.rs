@@ -6,8 +6,8 @@ use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use super::hash::{mix, normal_pair};
+use crate::core::units::{MPa, Rpm};
 use crate::extruder::pressure::{Fopdt, Running};
-use crate::units::{MPa, Rpm};
 
 /// Step of the plant \[s\].
 pub const TICK_S: f64 = 0.005;

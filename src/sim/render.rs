@@ -8,18 +8,18 @@ use super::bend::Bend;
 use super::contour::whole as float;
 use super::light::Light;
 use super::outline::{Bead, Outline};
-use super::picture::Picture;
 use super::seen::Seen;
 use super::shade::{self, Shape};
 use super::tint::Tint;
 use super::truth::{self, Truth};
 use super::view::View;
 use super::{grains, hash, motion, spots, texture};
-use crate::calib::Calibration;
-use crate::frame::{Frame, Pixels, WrongSize};
-use crate::geometry::ImagePoint;
-use crate::time::Stamp;
-use crate::units::Mm;
+use crate::calibration::Calibration;
+use crate::core::frame::{Frame, Pixels, WrongSize};
+use crate::core::geometry::ImagePoint;
+use crate::core::time::Stamp;
+use crate::core::units::Mm;
+use crate::scenario::image::Picture;
 use crate::vision::{Axis, Gauge};
 
 /// What the random numbers of a frame are for; those of the noise have no word.

@@ -2,10 +2,10 @@
 
 use super::laid::LaidBead;
 use super::render::{RenderError, Rendered, Renderer};
-use crate::calib::Calibration;
-use crate::config::Cell;
-use crate::time::Stamp;
-use crate::units::Mm;
+use crate::calibration::Calibration;
+use crate::cell::Cell;
+use crate::core::time::Stamp;
+use crate::core::units::Mm;
 
 /// Frames a second where a cell names no rate.
 const USUAL_RATE_HZ: f64 = 10.0;

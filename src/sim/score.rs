@@ -1,8 +1,8 @@
 //! Figures of a simulated layer.
 
 use super::cell::{Sight, Witness};
-use crate::control::{Event, RobotMode, Step};
-use crate::time::Stamp;
+use crate::core::time::Stamp;
+use crate::width_control::{Event, RobotMode, Step};
 
 /// A place along the bead and a value there.
 pub type AlongBead = (f64, f64);

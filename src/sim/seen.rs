@@ -2,9 +2,9 @@
 //! the grey that disturbances add.
 
 use super::discs::{self, Layer, Mask, Scene};
-use super::picture::Picture;
 use super::shade::Shape;
 use super::tint::Tint;
+use crate::scenario::image::Picture;
 
 /// Pixels line after line across the bead, until they are turned.
 #[derive(Debug, Clone)]

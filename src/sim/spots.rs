@@ -8,8 +8,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::contour::whole;
 use super::discs::{Disc, Mask};
-use super::picture::Spots;
 use super::shade::Shape;
+use crate::scenario::image::Spots;
 
 /// Discs at random places over the bead. They may cover each other: of the
 /// area a, N discs leave the share exp(−N·πr²/a).

@@ -7,19 +7,13 @@
 //!                                pressure ─power law─▶ flow, which wanders
 //! ```
 
-mod bead;
-mod dwell;
-pub mod experiment;
-mod melt;
-mod recording;
+pub mod bead;
+pub mod melt;
+pub mod recording;
 
 pub use bead::{Bench, Moment, Score, Strategy, WATCHED_S, Watched};
-pub use dwell::{Dwell, tune};
 pub use melt::{Machine, Melt};
 pub use recording::{Recording, example, record, to_csv};
 
 /// Pauses that starts are judged after \[s\].
 pub const IDLE_S: [f64; 7] = [0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0];
-
-#[cfg(test)]
-mod tests;

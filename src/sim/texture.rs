@@ -6,7 +6,7 @@ use rand_distr::StandardUniform;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::convolve::{convolve, kernel};
-use super::picture::Texture;
+use crate::scenario::image::Texture;
 
 /// Grey levels of a pattern over so many columns and rows, `None` where there
 /// is none. White noise, blurred with half the correlation length, has the

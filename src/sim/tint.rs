@@ -2,9 +2,9 @@
 //! older bead beside it.
 
 use super::contour::{clamp, whole};
-use super::normal::{cumulative, first_integral};
-use super::picture::Picture;
 use super::shade::{REACH, Shape};
+use crate::numeric::normal_distribution::{cumulative, first_integral};
+use crate::scenario::image::Picture;
 
 /// Places of a profile for each pixel.
 const PER_PX: f64 = 16.0;

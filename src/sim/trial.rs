@@ -1,11 +1,11 @@
 //! One simulated layer, and what became of the bead itself.
 
-use crate::calib::Calibration;
-use crate::config::cell::{Cell, RunPart};
-use crate::control::{Event, RobotState, Step};
-use crate::runner::NoRecorder;
-use crate::time::Stamp;
-use crate::units::Mm;
+use crate::calibration::Calibration;
+use crate::cell::file::{Cell, RunPart};
+use crate::core::time::Stamp;
+use crate::core::units::Mm;
+use crate::run::runner::NoRecorder;
+use crate::width_control::{Event, RobotState, Step};
 
 use super::cell::{Sight, SimCell, SimError, Witness};
 use super::score::{AlongBead, Score, mean};

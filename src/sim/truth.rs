@@ -2,7 +2,7 @@
 
 use super::outline::{Outline, Sample};
 use super::view::{Place, View, gauge_middle};
-use crate::geometry::ImagePoint;
+use crate::core::geometry::ImagePoint;
 use crate::vision::{Axis, Gauge};
 
 /// What a perfect measurement of a rendered frame would find.

@@ -8,8 +8,8 @@
 use nalgebra::Vector2;
 
 use super::bend::Bend;
-use crate::calib::SurfaceMap;
-use crate::geometry::{ImagePoint, Roi, SurfacePoint};
+use crate::calibration::SurfaceMap;
+use crate::core::geometry::{ImagePoint, Roi, SurfacePoint};
 use crate::vision::{Axis, Gauge};
 
 /// Places on the surface by their distance along the bead \[mm\], counted from
@@ -114,7 +114,7 @@ pub struct Place {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::Mm;
+    use crate::core::units::Mm;
     use crate::vision::Polarity;
 
     fn gauge(axis: Axis) -> Gauge {

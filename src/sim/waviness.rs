@@ -4,8 +4,8 @@
 use std::collections::VecDeque;
 use std::f64::consts::PI;
 
-use super::bead::Roughness;
 use super::hash;
+use crate::scenario::bead::Roughness;
 
 /// Nodes of white noise within one correlation length. Three make the variance
 /// between nodes constant to 1 in 10⁹.

@@ -1,9 +1,9 @@
 //! Laws that are tried on a cell as it was found.
 
 use super::propose::{DistanceProposal, Proposal};
-use crate::config::cell::RunPart;
-use crate::config::control::{Exponent, WidthLaw};
-use crate::control::pi::PiGains;
+use crate::cell::control::{Exponent, WidthLaw};
+use crate::cell::file::RunPart;
+use crate::width_control::pi::PiGains;
 
 /// A law that is tried.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,11 +1,11 @@
 //! What is taken of a run: reports, widths, setpoints, and how far a course of steps
 //! came.
 
-use crate::control::offset::Width;
-use crate::control::steps::{Progress, StepSettings, StepsTrace};
-use crate::control::{Command, Event, RobotState, Step};
-use crate::time::Stamp;
-use crate::units::MmPerS;
+use crate::core::time::Stamp;
+use crate::core::units::MmPerS;
+use crate::identify::camera_offset::Width;
+use crate::width_control::steps::{Progress, StepSettings, StepsTrace};
+use crate::width_control::{Command, Event, RobotState, Step};
 
 /// A run as it was recorded, in order.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -4,8 +4,8 @@
 use serde::Serialize;
 
 use super::Known;
-use crate::control::offset::{Seen, Study};
-use crate::vision::rank;
+use crate::identify::camera_offset::{Seen, Study};
+use crate::numeric::rank;
 
 /// Standard deviations of normal numbers in a median of absolute ones.
 const OF_MEDIAN: f64 = 1.4826;

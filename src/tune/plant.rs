@@ -6,9 +6,9 @@ use super::noise::{Drift, Scatter, scatter};
 use super::robot::{RobotAnswer, RobotError, answer};
 use super::timing::{Timing, timing};
 use super::{Known, Log, TuneError};
-use crate::control::follow::ROBOT_LAG;
-use crate::control::offset::{Search, Study, study};
-use crate::units::{Mm, MmPerS};
+use crate::core::readback::ROBOT_LAG;
+use crate::core::units::{Mm, MmPerS};
+use crate::identify::camera_offset::{Search, Study, study};
 
 /// Part of the exponent as which its standard deviation says nothing any more.
 const LOOSE: f64 = 1.0 / 3.0;

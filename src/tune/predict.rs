@@ -5,18 +5,18 @@ use serde::Serialize;
 
 use super::candidate::Candidate;
 use super::plant::Plant;
-use crate::calib::Calibration;
-use crate::config::Cell;
-use crate::config::cell::{RunPart, Source};
-use crate::config::rendered::{Level, Simulation};
-use crate::control::target::Target;
-use crate::control::{Event, Step};
-use crate::runner::NoRecorder;
-use crate::sim::bead::{BeadModel, Roughness};
+use crate::calibration::Calibration;
+use crate::cell::Cell;
+use crate::cell::file::{RunPart, Source};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm, MmPerS2};
+use crate::run::runner::NoRecorder;
+use crate::scenario::bead::{BeadModel, Roughness};
+use crate::scenario::disturbance::Flow;
+use crate::scenario::table::{Level, Simulation};
 use crate::sim::cell::{Sight, SimCell, SimError, Witness};
-use crate::sim::disturbance::Flow;
-use crate::time::{Span, Stamp};
-use crate::units::{Mm, MmPerS2};
+use crate::width_control::target::Target;
+use crate::width_control::{Event, Step};
 
 /// Step of the flow, as a share.
 pub const FLOW_STEP: f64 = 0.08;
@@ -123,7 +123,7 @@ impl World {
         };
         let median = |way: &dyn Fn(&Laid) -> f64| {
             let mut ways: Vec<f64> = laid.iter().map(way).collect();
-            crate::vision::rank::median(&mut ways).filter(|way| way.is_finite())
+            crate::numeric::rank::median(&mut ways).filter(|way| way.is_finite())
         };
         // A mean over the gauge knows of the step half a gauge before it.
         let calm_mm = self.step_at_mm - 0.5 * self.cell.simulation.gauge_length.get();
@@ -198,7 +198,7 @@ impl Witness for Laid {
             self.speed.push((state.path_mm.get(), state.speed_mm_per_s.get()));
         }
         self.stopped |= step.state.name() == "fault";
-        let Some(crate::control::Command::Speed(speed)) = step.command else { return };
+        let Some(crate::width_control::Command::Speed(speed)) = step.command else { return };
         if step.state.name() != "tracking" {
             return;
         }

@@ -5,10 +5,10 @@ use serde::Serialize;
 use super::noise::Drift;
 use super::plant::Plant;
 use super::stability::{LoopMargins, LoopPlant};
-use crate::config::cell::RunPart;
-use crate::config::control::WidthLaw;
-use crate::control::limiter::Limits;
-use crate::control::pi::PiGains;
+use crate::cell::control::WidthLaw;
+use crate::cell::file::RunPart;
+use crate::width_control::limiter::Limits;
+use crate::width_control::pi::PiGains;
 
 /// How far the flow is said to wander along a metre unless less is known; that of the
 /// law by distance.

@@ -17,8 +17,8 @@ use std::f64::consts::PI;
 use serde::Serialize;
 
 use super::plant::Plant;
-use crate::control::pi::PiGains;
-use crate::model::{TransferFunction, margins};
+use crate::numeric::lti::{TransferFunction, margins};
+use crate::width_control::pi::PiGains;
 
 /// Least margins that a loop is to have: a factor, and degrees (Åström and Murray 2008,
 /// section 9.3).

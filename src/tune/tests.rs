@@ -9,18 +9,18 @@ use super::noise::Drift;
 use super::propose::gains;
 use super::stability::LoopPlant;
 use super::{Facts, Log, Plant, TuneError, robot};
-use crate::calib::Calibration;
-use crate::config::Cell;
-use crate::config::cell::Purpose;
-use crate::control::offset::OffsetError;
-use crate::control::pi::PiGains;
-use crate::control::steps::Progress;
-use crate::control::{Event, RobotMode, RobotState, Step};
-use crate::model::margins;
-use crate::runner::NoRecorder;
+use crate::calibration::Calibration;
+use crate::cell::Cell;
+use crate::cell::file::Purpose;
+use crate::core::time::Stamp;
+use crate::core::units::{Mm, MmPerS};
+use crate::identify::camera_offset::OffsetError;
+use crate::numeric::lti::margins;
+use crate::run::runner::NoRecorder;
 use crate::sim::cell::{Sight, SimCell, Witness};
-use crate::time::Stamp;
-use crate::units::{Mm, MmPerS};
+use crate::width_control::pi::PiGains;
+use crate::width_control::steps::Progress;
+use crate::width_control::{Event, RobotMode, RobotState, Step};
 
 const SCALE: Calibration = Calibration::Scale { mm_per_px: 0.126_582, sigma: None };
 
@@ -133,7 +133,7 @@ fn a_flow_that_wanders_is_told_from_noise_and_widens_what_is_said() {
 fn every_setpoint_is_one_of_the_three_speeds_and_within_the_limits() {
     let mut cell = cell(0.3);
     let run = cell.run.as_mut().unwrap();
-    run.limits.max_accel = crate::units::MmPerS2::constant(200.0);
+    run.limits.max_accel = crate::core::units::MmPerS2::constant(200.0);
     let Watch { log, .. } = laid(&cell, 5);
     let (slow, fast) = (112.5 * 0.7 - 1e-9, 112.5 * 1.3 + 1e-9);
     for pair in log.setpoints.windows(2) {

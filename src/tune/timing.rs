@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::Log;
-use crate::time::Stamp;
-use crate::vision::rank;
+use crate::core::time::Stamp;
+use crate::numeric::rank;
 
 /// What a cell's clocks do \[s\]. Each is a median, with the 99th percentile where a
 /// late one matters.

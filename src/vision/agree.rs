@@ -2,8 +2,8 @@
 //! that most of them agree on. What covers an edge pulls to one side, so that
 //! means and medians of all of them go astray.
 
-use super::normal::Normal;
-use super::number::single;
+use crate::numeric::normal_equations::Normal;
+use crate::numeric::number::single;
 
 /// Lines and parabolas that are tried.
 const TRIALS: usize = 160;

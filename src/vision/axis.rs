@@ -5,9 +5,9 @@
 mod sections;
 mod spread;
 
-use crate::calib::SurfaceMap;
-use crate::geometry::SurfacePoint;
-use crate::units::Mm;
+use crate::calibration::SurfaceMap;
+use crate::core::geometry::SurfacePoint;
+use crate::core::units::Mm;
 
 use super::corner;
 use super::curve::{Curve, NOTABLE_PX, Point};

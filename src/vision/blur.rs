@@ -4,7 +4,7 @@
 use nalgebra::{Matrix5, Vector5};
 
 use super::fit::Model;
-use super::step::StepTable;
+use crate::numeric::blurred_step::StepTable;
 
 const BINS: usize = 161;
 const CENTRE: usize = BINS / 2;

@@ -2,7 +2,7 @@
 //! noise, a pixel near the end is cut off now and then, and one far above it
 //! nearly always.
 
-use super::step::StepTable;
+use crate::numeric::blurred_step::StepTable;
 
 /// Rounding to whole levels is noise too \[grey levels²\].
 const ROUNDING: f64 = 1.0 / 12.0;

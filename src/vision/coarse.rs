@@ -3,10 +3,10 @@
 //! whole gauge (a Radon transform of the step response). Texture averages out;
 //! an edge does not.
 
-use super::number::{single, whole};
 use super::pair::{RIVAL_SHARE, SEAM_SHARE, is_narrower};
-use super::rank;
 use super::strip::{Grey, Strip};
+use crate::numeric::number::{single, whole};
+use crate::numeric::rank;
 
 /// Rows of a band at least, and bands at most.
 const BAND_ROWS: usize = 8;

@@ -4,8 +4,8 @@
 //! first, then the strongest of what it leaves.
 
 use super::edge::{Candidate, Candidates, KEPT};
-use super::number::single;
-use super::rank;
+use crate::numeric::number::single;
+use crate::numeric::rank;
 
 /// Contours of one sign that are looked for.
 const MOST: usize = 6;

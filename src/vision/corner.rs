@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::curve::Point;
-use super::normal::Normal;
+use crate::numeric::normal_equations::Normal;
 
 /// Places along the gauge at which an edge may turn, −1 to 1: so many, this far
 /// from its middle at most.

@@ -3,9 +3,9 @@
 
 use super::edge::{Candidate, Candidates};
 use super::parallel::Parallel;
-use super::step::StepTable;
 use super::strip::Grey;
 use super::trace::{Scene, Tracer};
+use crate::numeric::blurred_step::StepTable;
 
 /// By how much the distance of two steps may differ from that of the rough
 /// edges \[px\].

@@ -1,7 +1,7 @@
 //! The course of an edge along the gauge as a short polynomial: where it runs
 //! in the mean, in which direction, and how it bends.
 
-use super::number::float;
+use crate::numeric::number::float;
 use nalgebra::{SMatrix, SVector};
 
 /// Terms that a curve has at most: up to t⁴.

@@ -5,11 +5,11 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::censor::{self, Seen};
-use super::normal::Normal;
 use super::overlay::{Overlay, Profile};
-use super::rank;
 use super::sheet::{Sheet, Window};
-use super::step::StepTable;
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::normal_equations::Normal;
+use crate::numeric::rank;
 
 /// Parts along the bead that are told apart, because light may change.
 const PARTS: usize = 3;
@@ -408,9 +408,9 @@ fn solve(rows: &[Row], limit: f64) -> Option<Line> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::{Frame, Pixels};
-    use crate::geometry::Roi;
-    use crate::time::Stamp;
+    use crate::core::frame::{Frame, Pixels};
+    use crate::core::geometry::Roi;
+    use crate::core::time::Stamp;
     use crate::vision::gauge::Axis;
     use crate::vision::strip::{Strips, Turner, View};
 

@@ -7,10 +7,10 @@
 //! and no standard deviation of its own; [`SIGMA_PX`] stands for that.
 
 use crate::bridge::{EdgeSettings, Segment, canny_hough};
-use crate::calib::SurfaceMap;
-use crate::frame::Frame;
-use crate::geometry::ImagePoint;
-use crate::units::Mm;
+use crate::calibration::SurfaceMap;
+use crate::core::frame::Frame;
+use crate::core::geometry::ImagePoint;
+use crate::core::units::Mm;
 
 use super::gauge::{Axis, Gauge, Polarity};
 use super::reject::Reject;
@@ -211,9 +211,9 @@ fn polarity_fits(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::Pixels;
-    use crate::geometry::Roi;
-    use crate::time::Stamp;
+    use crate::core::frame::Pixels;
+    use crate::core::geometry::Roi;
+    use crate::core::time::Stamp;
     use crate::vision::Method;
 
     fn bar(from: usize, to: usize) -> Frame {

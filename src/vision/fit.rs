@@ -4,7 +4,7 @@
 
 use nalgebra::{Matrix4, Vector4};
 
-use super::step::StepTable;
+use crate::numeric::blurred_step::StepTable;
 
 const MAX_STEPS: usize = 8;
 const CONVERGED_PX: f64 = 1e-4;

@@ -1,8 +1,8 @@
 //! Where in the image the bead is measured, and what it looks like there.
 
-use crate::calib::SurfaceMap;
-use crate::geometry::{ImagePoint, Roi};
-use crate::units::Mm;
+use crate::calibration::SurfaceMap;
+use crate::core::geometry::{ImagePoint, Roi};
+use crate::core::units::Mm;
 
 /// How the bead runs in the image, to within 20 degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

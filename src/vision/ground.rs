@@ -1,9 +1,9 @@
 //! The pattern of what lies beside an edge, ground or bead: how strong it is, and how far
 //! it may move the mean of the edge.
 
-use super::number::{float, narrow, whole};
-use super::rank;
 use super::strip::{Grey, Strip};
+use crate::numeric::number::{float, narrow, whole};
+use crate::numeric::rank;
 
 /// Distances from the edge at which the pattern is looked at \[px\]: the first one
 /// beyond the flank, in blurs and at least, and those after it.

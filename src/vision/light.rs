@@ -2,8 +2,8 @@
 //! levels beside an edge by less than their noise shows there, and tells by how much by its
 //! slopes at both edges.
 
-use super::number::float;
 use super::overlay::{REACH, Shading, Shape};
+use crate::numeric::number::float;
 
 /// How far the slopes of the light on the two sides of an edge may differ, as a fraction of
 /// their mean: those of a bead or of ground that is shaded itself are its alone.

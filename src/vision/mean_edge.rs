@@ -12,14 +12,14 @@
 mod weights;
 
 use super::coarse::StepLine;
-use super::number::{float, floor, narrow, whole};
-use super::rank;
 use super::rough::RoughFit;
 use super::sheet::PLENTY;
-use super::step::StepTable;
 use super::strip::{Grey, Strip};
 use super::trace::Located;
 use super::vectors;
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::{float, floor, narrow, whole};
+use crate::numeric::rank;
 use weights::{Samples, Weights, product};
 
 /// Half of the window about an edge \[px\]: longer than a pattern of usual size, so that

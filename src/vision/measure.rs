@@ -13,9 +13,9 @@ mod skew;
 #[cfg(test)]
 mod tests;
 
-use crate::calib::SurfaceMap;
-use crate::frame::Frame;
-use crate::geometry::ImagePoint;
+use crate::calibration::SurfaceMap;
+use crate::core::frame::Frame;
+use crate::core::geometry::ImagePoint;
 use judge::{WIDEST_BLUR_PX, WIDEST_MOTION_PX};
 use patterned::STRONGEST_BESIDE_WHOLE;
 use rough::may_be_rough;
@@ -30,7 +30,6 @@ use super::ground::{Ground, Place};
 use super::mean_edge::MeanEdge;
 use super::motion::BlurShapes;
 use super::noise::PixelNoise;
-use super::number::float;
 use super::parallel::Parallel;
 use super::pool::{self, Bands};
 use super::reject::Reject;
@@ -40,6 +39,7 @@ use super::strip::{Grey, Strip, Strips, Turner, View};
 use super::trace::Tracer;
 use super::vectors;
 use super::width::{Caliper, EdgePlace, Edges, Hints, WidthMeasurement};
+use crate::numeric::number::float;
 
 /// Share of the caliper lines that must show each of the two edges.
 const NEED_SHARE: f64 = 0.6;

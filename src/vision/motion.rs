@@ -2,7 +2,7 @@
 //! across the bead while the shutter is open.
 
 use super::overlay::Look;
-use super::step::StepTable;
+use crate::numeric::blurred_step::StepTable;
 
 /// Fractions of the blur's variance that a box makes: neighbours differ by what a
 /// hundred rows with a contrast of twenty times the noise just tell apart.

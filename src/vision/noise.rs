@@ -106,9 +106,9 @@ fn count_below(differences: &[u16; ROWS * RUN], limit: u16) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::{Frame, Pixels};
-    use crate::geometry::Roi;
-    use crate::time::Stamp;
+    use crate::core::frame::{Frame, Pixels};
+    use crate::core::geometry::Roi;
+    use crate::core::time::Stamp;
     use crate::vision::gauge::Axis;
     use crate::vision::strip::{Strips, Turner, View};
     use rand::SeedableRng;

@@ -1,7 +1,7 @@
 //! Calipers that disagree with their neighbours: grains, sparks, wrong picks.
 
-use super::rank;
 use super::trace::Located;
+use crate::numeric::rank;
 
 /// Distances at which neighbours are asked.
 const SPANS: [usize; 3] = [1, 2, 3];

@@ -6,8 +6,8 @@
 use std::ops::Range;
 
 use super::phase::split;
-use super::rank;
 use super::sheet::Sheet;
+use crate::numeric::rank;
 
 mod curved;
 mod flank;

@@ -4,7 +4,7 @@
 //! weaker than the edges; where it is not, two pairs fit.
 
 use super::contour::{Contour, Contours};
-use super::rank;
+use crate::numeric::rank;
 
 /// Depth of a gap between two edges, as a share of the weaker one, that shows them
 /// to belong to two beads: it is deeper than the bead is high over the ground.

@@ -1,9 +1,9 @@
 //! Rough places and levels, one a band, made into smooth ones that every row
 //! can be held against.
 
-use super::number::{narrow, single};
 use super::pool::{Bands, middle};
-use super::rank;
+use crate::numeric::number::{narrow, single};
+use crate::numeric::rank;
 
 /// Bands on either side that a smoothed value is taken from.
 const NEIGHBOURS: usize = 3;
@@ -292,14 +292,14 @@ mod tests {
 
     #[test]
     fn the_course_runs_straight_between_bands_and_on_beyond_them() {
-        let frame = crate::frame::Frame::new(
+        let frame = crate::core::frame::Frame::new(
             0,
-            crate::time::Stamp::START,
+            crate::core::time::Stamp::START,
             (20, 43),
-            crate::frame::Pixels::Grey8(vec![0; 860]),
+            crate::core::frame::Pixels::Grey8(vec![0; 860]),
         );
         let frame = frame.unwrap();
-        let roi = crate::geometry::Roi { x: 0, y: 0, width: 20, height: 43 };
+        let roi = crate::core::geometry::Roi { x: 0, y: 0, width: 20, height: 43 };
         let view = crate::vision::strip::View::new(roi, crate::vision::gauge::Axis::Vertical);
         let mut turner = crate::vision::strip::Turner::default();
         let crate::vision::strip::Strips::Bytes(strip) = turner.strips(&frame, &view, None) else {

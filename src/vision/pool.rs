@@ -145,9 +145,9 @@ fn count_full<T: Grey>(row: &[T], white: T) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::{Frame, Pixels};
-    use crate::geometry::Roi;
-    use crate::time::Stamp;
+    use crate::core::frame::{Frame, Pixels};
+    use crate::core::geometry::Roi;
+    use crate::core::time::Stamp;
     use crate::vision::gauge::Axis;
     use crate::vision::strip::{Strips, Turner, View};
 

@@ -6,10 +6,10 @@
 use super::blur::Overlay;
 use super::fit::{Edge, EdgeFit, Prior, Window};
 use super::pool;
-use super::rank;
-use super::step::StepTable;
 use super::strip::{Grey, Strip};
 use super::trace::Located;
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::rank;
 
 /// Neighbours on either side that tell the local slope and levels.
 const NEIGHBOURS: usize = 4;

@@ -22,10 +22,10 @@ mod window;
 
 use super::coarse::StepLine;
 use super::gauge::EdgeKind;
-use super::number::{float, narrow, whole};
-use super::step::StepTable;
 use super::strip::{Grey, Strip};
 use super::trace::{self, Located};
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::{float, narrow, whole};
 use crossing::INSIDE_PX;
 pub use groove::Blur;
 use groove::EdgeShape;

@@ -21,8 +21,8 @@ pub use local::{CaliperFilter, LocalWidths};
 
 use super::measure::Measurer;
 use super::width::WidthMeasurement;
-use crate::calib::SurfaceMap;
-use crate::units::Mm;
+use crate::calibration::SurfaceMap;
+use crate::core::units::Mm;
 use overlap::Overlap;
 use spectrum::{BLURS, Kind, Spectrum, lengths_mm};
 

@@ -3,9 +3,9 @@
 
 use super::noise;
 use super::reject::Reject;
-use super::step::StepTable;
 use super::strip::{Grey, Strip};
 use super::trace::{Scene, Tracer};
+use crate::numeric::blurred_step::StepTable;
 
 /// Share of a step that must lie below the end of the scale.
 const NEED_VISIBLE: f64 = 0.4;

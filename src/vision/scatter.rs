@@ -1,7 +1,7 @@
 //! How far the places of an edge scatter about its course, and over how many
 //! bands that hangs together.
 
-use super::number::float;
+use crate::numeric::number::float;
 
 /// Weights of a parabola through nine neighbours at the middle one, over 231.
 const SMOOTHER: [f64; 9] = [-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0];

@@ -1,8 +1,8 @@
 //! The gauge straightened along an edge: the pixels around it, one window a few
 //! rows, read once and held against the edge as often as it takes.
 
-use super::number::{floor, single};
 use super::strip::{Grey, Strip};
+use crate::numeric::number::{floor, single};
 
 /// Pixels of a window.
 pub const SPAN: usize = 112;

@@ -4,8 +4,8 @@
 //! gauge's first pixel. A vertical bead has `u` along x; for a horizontal one
 //! `u` runs along y, so that its upper edge is the left one.
 
-use crate::frame::{Frame, Pixels};
-use crate::geometry::{ImagePoint, Roi};
+use crate::core::frame::{Frame, Pixels};
+use crate::core::geometry::{ImagePoint, Roi};
 
 use super::gamma::Linear;
 use super::gauge::Axis;
@@ -315,7 +315,7 @@ fn transposed<T: Grey>(mut tile: [[T; TILE]; TILE]) -> [[T; TILE]; TILE] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::Stamp;
+    use crate::core::time::Stamp;
 
     fn ramp() -> Frame {
         let values = (0..20u8).flat_map(|y| (0..30u8).map(move |x| x * 4 + y)).collect();

@@ -3,10 +3,10 @@
 
 use nalgebra::Matrix3;
 
-use super::number::float;
 use super::overlay::Shape;
 use super::phase::{offset, split};
-use super::step::StepTable;
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::float;
 
 pub mod textured;
 

@@ -4,8 +4,8 @@
 
 use std::sync::LazyLock;
 
-use super::number::float;
 use super::overlay::Overlay;
+use crate::numeric::number::float;
 
 /// Variance of the rows about an edge, in that of their noise, from which on
 /// they are looked at for texture: noise alone, in 100 rows, has less in all but one of

@@ -12,19 +12,19 @@ mod winding;
 
 use super::cut_off::CutOff;
 use super::light::Surroundings;
-use super::number::{float, narrow};
 use super::overlay::{EdgeSkew, Extent, Look, Overlay, REACH, Shape, Step};
 use super::path::{self, Course};
 use super::pool::{self, Bands};
 use super::refine::{Refiner, Task};
 use super::rough::RoughFit;
 use super::sheet::Sheet;
-use super::step::StepTable;
 use super::strip::{Grey, Strip};
 use super::template::textured::Scatter;
 use super::template::{PlainSums, Template};
 use super::texture::Texture;
 use super::whiten::Whitener;
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::{float, narrow};
 
 /// Passes over the rows at most; a second one is made only where the first
 /// path was off by a good part of the blur.

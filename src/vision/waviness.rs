@@ -9,7 +9,7 @@
 use std::sync::LazyLock;
 
 use super::curve::Curve;
-use super::number::float;
+use crate::numeric::number::float;
 
 /// Legendre coefficients that are looked at: of the orders 1 to 8.
 pub const ORDERS: usize = 8;

@@ -125,7 +125,7 @@ mod tests {
             let d = f64::from(u32::try_from(d).unwrap());
             7.0 * libm::exp(-d * d / 16.0) + if d == 0.0 { 1.0 } else { 0.0 }
         };
-        let table = crate::vision::step::StepTable::default();
+        let table = crate::numeric::blurred_step::StepTable::default();
         let (mut slope, mut after) = ([0.0; MOST], [0.0; MOST]);
         for k in 0..n {
             let z = (f64::from(u32::try_from(k).unwrap()) - 11.3) / 1.5;

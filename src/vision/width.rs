@@ -1,9 +1,9 @@
 //! The result of a measurement.
 
 use super::reject::Reject;
-use crate::calib::SurfaceMap;
-use crate::geometry::ImagePoint;
-use crate::units::Mm;
+use crate::calibration::SurfaceMap;
+use crate::core::geometry::ImagePoint;
+use crate::core::units::Mm;
 
 /// A width that can be trusted, and how far.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,17 +4,17 @@ use std::net::{SocketAddr, TcpListener};
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, unbounded};
-use truebead::config::extruder::LinearPlant;
+use truebead::cell::extruder::LinearPlant;
+use truebead::core::time::Span;
+use truebead::drivers::extruder::{ExtruderClient, ExtruderConfig, ExtruderEvent, ExtruderNotSent};
+use truebead::drivers::line::LinkTiming;
 use truebead::extruder::{Drive, ExtruderCommand, PumpMode};
 use truebead::io::clock::RunClock;
-use truebead::io::extruder::{ExtruderClient, ExtruderConfig, ExtruderEvent, ExtruderNotSent};
-use truebead::io::extruder_sim::{ExtruderOptions, ExtruderSim};
-use truebead::io::link::LinkTiming;
 use truebead::link::ErrCode;
 use truebead::link::extruder::{ExtruderHello, ExtruderStatus, Faults};
-use truebead::model::TransferFunction;
+use truebead::numeric::lti::TransferFunction;
 use truebead::sim::extruder::{Delays, Linear, SimExtruder};
-use truebead::time::Span;
+use truebead::simulators::extruder::{ExtruderOptions, ExtruderSim};
 
 /// What should happen does so long before; only a failure waits for it.
 const PATIENCE: Duration = Duration::from_secs(20);

@@ -6,10 +6,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use truebead::calib::SurfaceMap;
-use truebead::frame::Frame;
-use truebead::geometry::Roi;
-use truebead::units::Mm;
+use truebead::calibration::SurfaceMap;
+use truebead::core::frame::Frame;
+use truebead::core::geometry::Roi;
+use truebead::core::units::Mm;
 use truebead::vision::{Axis, Gauge, Measurer, Polarity};
 
 use super::concrete_labels::{COLUMNS, Sequence};

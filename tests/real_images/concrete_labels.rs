@@ -4,8 +4,8 @@
 use std::ops::{Range, RangeInclusive};
 use std::path::Path;
 
-use truebead::frame::Frame;
-use truebead::geometry::Roi;
+use truebead::core::frame::Frame;
+use truebead::core::geometry::Roi;
 
 use super::image;
 

@@ -3,8 +3,8 @@
 //! the layer in it as they were read by hand at the gauge's middle column, to some
 //! 5 px. With three polarities and two ranges that is 90 settings.
 
-use truebead::geometry::Roi;
-use truebead::units::Mm;
+use truebead::core::geometry::Roi;
+use truebead::core::units::Mm;
 use truebead::vision::{Axis, Gauge, Polarity};
 
 use super::{data, image, measure};

@@ -13,12 +13,12 @@ mod whole_image;
 
 use std::path::{Path, PathBuf};
 
-use truebead::calib::SurfaceMap;
-use truebead::frame::{Channel, Frame};
-use truebead::io::camera::video::VideoFile;
+use truebead::calibration::SurfaceMap;
+use truebead::core::frame::{Channel, Frame};
+use truebead::core::time::Stamp;
+use truebead::drivers::camera::video::VideoFile;
 use truebead::io::image_file;
-use truebead::ports::{FrameSource, Grab};
-use truebead::time::Stamp;
+use truebead::run::ports::{FrameSource, Grab};
 use truebead::vision::{Gauge, Measurer, Reject, WidthMeasurement};
 
 /// A file or folder of the real images, if it is there.

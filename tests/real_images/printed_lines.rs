@@ -5,8 +5,8 @@
 
 use std::collections::BTreeMap;
 
-use truebead::geometry::Roi;
-use truebead::units::Mm;
+use truebead::core::geometry::Roi;
+use truebead::core::units::Mm;
 use truebead::vision::{Axis, Gauge, Polarity, WidthMeasurement};
 
 use super::statistics::{median, sizes};

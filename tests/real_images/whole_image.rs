@@ -3,10 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
-use truebead::frame::Frame;
-use truebead::geometry::Roi;
+use truebead::core::frame::Frame;
+use truebead::core::geometry::Roi;
+use truebead::core::units::Mm;
 use truebead::io::image_file::has_image_extension;
-use truebead::units::Mm;
 use truebead::vision::{Axis, Gauge, Polarity};
 
 use super::statistics::median;

@@ -2,14 +2,14 @@
 
 use std::time::Duration;
 
-use truebead::control::{Command, RobotMode};
-use truebead::io::clock::RunClock;
-use truebead::io::robot::{
+use truebead::core::time::Stamp;
+use truebead::drivers::robot::{
     LinkClient, LinkConfig, LinkConfigError, LinkTiming, NotSent, RobotEvent,
 };
+use truebead::io::clock::RunClock;
 use truebead::link::{ErrCode, Faults};
-use truebead::ports::RobotPort;
-use truebead::time::Stamp;
+use truebead::run::ports::RobotPort;
+use truebead::width_control::{Command, RobotMode};
 
 use crate::support::{Pc, Talk, config, listener, sim, sim_on, speed};
 
@@ -82,7 +82,7 @@ fn a_stop_leaves_in_any_mode() {
     assert_eq!(refused, NotSent::NotPrinting { mode: RobotMode::Idle });
     assert_eq!(pc.link.send(Command::Stop).unwrap().seq, 1);
     pc.until_state(|state| state.seq == 1);
-    assert!(sim.begin_bead(truebead::units::Mm::ZERO));
+    assert!(sim.begin_bead(truebead::core::units::Mm::ZERO));
     pc.until_mode(RobotMode::Print);
     assert_eq!(pc.link.send(Command::Stop).unwrap().seq, 2);
     pc.until_mode(RobotMode::Stop);

@@ -73,7 +73,8 @@ fn table(tree: &Tree) -> Result<String, String> {
         ("replaced words in names", names.len().to_string()),
         ("replaced words in texts", texts.len().to_string()),
     ];
-    Ok(rows.iter().map(|(what, figure)| format!("{what:<46} {figure:>7}\n")).collect())
+    let rows = rows.map(|(what, figure)| format!("{what:<46} {figure:>7}\n"));
+    Ok(rows.concat())
 }
 
 fn one_list(tree: &Tree, what: &str, src: &Path) -> Result<String, String> {
@@ -135,5 +136,5 @@ fn one_list(tree: &Tree, what: &str, src: &Path) -> Result<String, String> {
             .collect(),
         _ => return Err(USAGE.to_owned()),
     };
-    Ok(rows.iter().map(|row| format!("{row}\n")).collect())
+    Ok(rows.iter().flat_map(|row| [row.as_str(), "\n"]).collect())
 }

@@ -11,12 +11,16 @@ use image::{GrayImage, ImageFormat};
 use rayon::prelude::*;
 
 use super::AccuracyArgs;
-use crate::calib::SurfaceMap;
+use crate::calibration::SurfaceMap;
 use crate::cli::{Voice, WrongArguments};
-use crate::frame::Pixels;
-use crate::offline::accuracy::drawn::{Deviation, DrawnOutcome, Refusal, figures, markdown, table};
-use crate::offline::{Progress, output};
-use crate::sim::drawn::{self, DrawnFrame, DrawnSet};
+use crate::core::frame::Pixels;
+use crate::io::progress::Progress;
+use crate::rows::output;
+use crate::studies::accuracy::drawn;
+use crate::studies::accuracy::drawn::{DrawnFrame, DrawnSet};
+use crate::studies::accuracy::drawn_table::{
+    Deviation, DrawnOutcome, Refusal, figures, markdown, table,
+};
 use crate::vision::Measurer;
 
 /// Frames of a set where nothing else is said: what its limits are made for.

@@ -7,14 +7,15 @@ use anyhow::{Context, Result};
 use rayon::prelude::*;
 
 use super::AccuracyArgs;
-use crate::calib::SurfaceMap;
+use crate::calibration::SurfaceMap;
 use crate::cli::Voice;
-use crate::offline::accuracy::roughness::{
+use crate::core::units::Mm;
+use crate::io::progress::Progress;
+use crate::rows::output;
+use crate::studies::accuracy::drawn::LongBead;
+use crate::studies::accuracy::roughness_table::{
     BeadOutcome, Found, OwnMeanError, Ratio, figures, markdown, table,
 };
-use crate::offline::{Progress, output};
-use crate::sim::drawn::LongBead;
-use crate::units::Mm;
 use crate::vision::{Measurer, Roughness, RoughnessEstimator};
 
 /// Length of each bead in its correlation lengths.

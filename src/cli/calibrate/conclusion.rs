@@ -6,18 +6,21 @@ use anyhow::Context;
 
 use super::plane::{self, Plane};
 use super::{CalibrateArgs, Pictures, report};
-use crate::calib::board::Board;
-use crate::calib::covariance::Covariance;
-use crate::calib::map::{self, WidthMap};
-use crate::calib::next_view::{self, NextView};
-use crate::calib::quality;
-use crate::calib::share;
-use crate::calib::sighting::Sighting;
-use crate::calib::solve::{self, Solution};
-use crate::calib::{Calibration, Quality, file};
+use crate::calibration::board::Board;
+use crate::calibration::covariance::Covariance;
+use crate::calibration::map;
+use crate::calibration::map::WidthMap;
+use crate::calibration::next_view;
+use crate::calibration::next_view::NextView;
+use crate::calibration::quality;
+use crate::calibration::share;
+use crate::calibration::sighting::Sighting;
+use crate::calibration::solve;
+use crate::calibration::solve::Solution;
+use crate::calibration::{Calibration, Quality, file};
+use crate::core::units::Mm;
 use crate::io::whole_file::write_whole;
-use crate::offline::calibration::Page;
-use crate::units::Mm;
+use crate::report::calibration::Page;
 
 /// A camera that was found, and how well.
 pub struct Conclusion<'a> {

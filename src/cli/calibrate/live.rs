@@ -10,21 +10,22 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::conclusion::{Conclusion, taken};
 use super::{CalibrateArgs, Pictures, WrongArguments};
-use crate::calib::board::Board;
-use crate::calib::collect::{Collector, News};
-use crate::calib::coverage::{Coverage, PARTS, SIDES};
-use crate::calib::quality;
-use crate::calib::sighting;
-use crate::calib::solve::FEWEST_VIEWS;
-use crate::config::cell::Source;
-use crate::frame::{Channel, Frame};
-use crate::io::camera::open::{self, LiveOptions};
+use crate::calibration::board::Board;
+use crate::calibration::collect::{Collector, News};
+use crate::calibration::coverage::{Coverage, PARTS, SIDES};
+use crate::calibration::quality;
+use crate::calibration::sighting;
+use crate::calibration::solve::FEWEST_VIEWS;
+use crate::cell::file::Source;
+use crate::core::frame::{Channel, Frame};
+use crate::core::time::Span;
+use crate::drivers::camera::open;
+use crate::drivers::camera::open::LiveOptions;
 use crate::io::clock::RunClock;
 use crate::io::image_file;
 use crate::io::stop::StopSignal;
 use crate::io::whole_file::write_whole;
-use crate::ports::{FrameSource, Grab};
-use crate::time::Span;
+use crate::run::ports::{FrameSource, Grab};
 
 /// Longest wait for a picture \[s\].
 const DEADLINE_S: f64 = 5.0;

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 
 use super::{CalibrateArgs, Pictures, WrongArguments, check_size, look_at};
-use crate::calib::board::{Board, Seen};
-use crate::calib::charuco::NoMarkers;
-use crate::calib::equations::{Corner, Model};
-use crate::calib::plane::OnBed;
-use crate::calib::refusal::Refusal;
-use crate::calib::sighting::{Looks, is_same_place};
-use crate::calib::solve::Solution;
-use crate::units::Mm;
+use crate::calibration::board::{Board, Seen};
+use crate::calibration::charuco::NoMarkers;
+use crate::calibration::equations::{Corner, Model};
+use crate::calibration::plane::OnBed;
+use crate::calibration::refusal::Refusal;
+use crate::calibration::sighting::{Looks, is_same_place};
+use crate::calibration::solve::Solution;
+use crate::core::units::Mm;
 
 /// Corners on the bed may be so many times further off than those of the other
 /// pictures, and so far in any case \[px\]; beyond that the pictures do not belong to

@@ -5,16 +5,17 @@ use std::fmt::Write;
 use nalgebra::{Point3, Vector3};
 
 use super::plane::Plane;
-use crate::calib::Calibration;
-use crate::calib::camera::NUMBERS;
-use crate::calib::covariance::Covariance;
-use crate::calib::map::{self, WidthMap};
-use crate::calib::next_view::NextView;
-use crate::calib::quality;
-use crate::calib::scale::single_scale;
-use crate::calib::sighting::Looks;
-use crate::calib::solve::{SHARED_NAMES, Solution};
-use crate::units::Mm;
+use crate::calibration::Calibration;
+use crate::calibration::camera::NUMBERS;
+use crate::calibration::covariance::Covariance;
+use crate::calibration::map;
+use crate::calibration::map::WidthMap;
+use crate::calibration::next_view::NextView;
+use crate::calibration::quality;
+use crate::calibration::scale::single_scale;
+use crate::calibration::sighting::Looks;
+use crate::calibration::solve::{SHARED_NAMES, Solution};
+use crate::core::units::Mm;
 
 /// Adds a line to a text, which cannot fail.
 macro_rules! line {

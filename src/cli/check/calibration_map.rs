@@ -5,13 +5,13 @@ use std::path::Path;
 
 use nalgebra::Vector2;
 
-use crate::calib::Calibration;
-use crate::calib::map::CELLS;
-use crate::calib::share_map::{Bead, ShareMap, share_at};
-use crate::cli::cell::LoadedCell;
-use crate::geometry::{ImagePoint, Roi};
+use crate::assembly::LoadedCell;
+use crate::calibration::Calibration;
+use crate::calibration::map::CELLS;
+use crate::calibration::share_map::{Bead, ShareMap, share_at};
+use crate::core::geometry::{ImagePoint, Roi};
 use crate::io::whole_file::write_whole;
-use crate::offline::calibration::cell::CellPage;
+use crate::report::calibration::cell::CellPage;
 use crate::vision::gauge::Axis;
 
 /// Cells of the map in text, along the image and across it.

@@ -3,13 +3,13 @@
 use anyhow::Context;
 
 use super::{ConvertArgs, WrongArguments};
-use crate::calib::board::Board;
-use crate::calib::equations::Model;
-use crate::calib::exchange::{Import, Intrinsics};
-use crate::calib::{Quality, file};
+use crate::calibration::board::Board;
+use crate::calibration::equations::Model;
+use crate::calibration::exchange::{Import, Intrinsics};
+use crate::calibration::{Quality, file};
 use crate::cli::calibrate::plane::{Boards, Plane, looked_for};
 use crate::cli::calibrate::{board_of, report, say};
-use crate::units::Mm;
+use crate::core::units::Mm;
 
 /// Corners on the bed may be so far off \[px\]; beyond that the pictures do not belong
 /// to this camera, or the boards lay on no plane.

@@ -6,11 +6,11 @@ use clap::Args;
 
 use super::data::Rows;
 use crate::cli::WrongArguments;
+use crate::core::quantity::Unit;
+use crate::core::units::Mm;
 use crate::extruder::demand::section;
 use crate::identify::align::{AlignError, to_extruded};
 use crate::identify::flow::at_moments;
-use crate::identify::quantity::Unit;
-use crate::units::Mm;
 
 /// The column that a flow gets that is made of others, as in a recording.
 pub const LAID_FLOW: &str = "laid_flow_mm3_per_s";

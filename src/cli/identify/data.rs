@@ -8,13 +8,13 @@ use super::bead::Bead;
 use super::options::Columns;
 use super::source::Source;
 use crate::cli::WrongArguments;
+use crate::core::quantity::Unit;
 use crate::identify::experiment::{Experiment, ExperimentError, Rules, doubt_unit};
-use crate::identify::hampel::Hampel;
-use crate::identify::quantity::Unit;
-use crate::identify::savgol::SavGol;
 use crate::identify::series::paired;
 use crate::identify::table::{Table, TableError};
-use crate::offline::recorded::Recorded;
+use crate::io::recorded::Recorded;
+use crate::numeric::hampel::Hampel;
+use crate::numeric::savgol::SavGol;
 
 /// How the output is cleaned before a model is fitted.
 #[derive(Debug, Clone, Copy)]

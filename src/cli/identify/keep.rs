@@ -10,7 +10,7 @@ use crate::cli::outcome::refuse_replacing;
 use crate::identify::file::parse;
 use crate::identify::library::file_name;
 use crate::io::model_file::read_library;
-use crate::offline::output::{make_folder, write_whole};
+use crate::rows::output::{make_folder, write_whole};
 
 /// What a model is called in its own folder.
 pub const MODEL: &str = "model.toml";

@@ -10,10 +10,10 @@ use super::data::Rows;
 use super::options::Columns;
 use super::source::Source;
 use crate::cli::WrongArguments;
+use crate::core::quantity::Unit;
+use crate::core::units::MPa;
 use crate::extruder::pressure::kalman::Noise;
 use crate::identify::grid::usual_step;
-use crate::identify::quantity::Unit;
-use crate::units::MPa;
 
 /// A pressure's own steps from reading to reading over the scatter of the
 /// readings: beyond it, it was hardly at rest.

@@ -4,11 +4,11 @@ use clap::Args;
 
 use super::{Forms, Wanted};
 use crate::cli::WrongArguments;
+use crate::core::quantity::{Quantity, Unit};
 use crate::identify::fit::{DeadTime, MOST_POLES, Structure};
-use crate::identify::hampel::Hampel;
-use crate::identify::quantity::{Quantity, Unit};
-use crate::identify::savgol::SavGol;
 use crate::identify::series::Series;
+use crate::numeric::hampel::Hampel;
+use crate::numeric::savgol::SavGol;
 
 /// Which columns are meant, and what they hold.
 #[derive(Debug, Args)]

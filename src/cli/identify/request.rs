@@ -7,11 +7,11 @@ use anyhow::{Context, Result};
 use super::bead::LAID_FLOW;
 use super::{DEAD_TIME_S, DEAD_TIME_SHARE, IdentifyArgs, VALIDATE_SHARE, data};
 use crate::cli::WrongArguments;
+use crate::core::quantity::Quantity;
 use crate::identify::experiment::Experiment;
 use crate::identify::file::Setting;
 use crate::identify::fit::{DeadTime, Settings, Structure};
-use crate::identify::quantity::Quantity;
-use crate::offline::identify::Logs;
+use crate::report::identify::Logs;
 
 /// Refuses one column that is named twice.
 pub fn refuse_same(input: &str, output: &str) -> Result<(), WrongArguments> {

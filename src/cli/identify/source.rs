@@ -7,13 +7,13 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use super::bead::Bead;
+use crate::cell::Cell;
+use crate::cell::file::Purpose;
 use crate::cli::WrongArguments;
-use crate::config::Cell;
-use crate::config::cell::Purpose;
+use crate::core::units::Mm;
 use crate::identify::table::Table;
+use crate::io::recorded::{Facts, Recorded, columns};
 use crate::io::recording::Recording;
-use crate::offline::recorded::{Facts, Recorded, columns};
-use crate::units::Mm;
 
 /// How an MCAP file begins.
 const MAGIC: &[u8] = b"\x89MCAP";

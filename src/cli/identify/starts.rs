@@ -10,13 +10,13 @@ use super::source::Source;
 use super::{IdentifyArgs, keep};
 use crate::cli::WrongArguments;
 use crate::cli::outcome::free_folder;
+use crate::core::quantity::{Quantity, Unit};
 use crate::identify::experiment::{Rules, check_time};
-use crate::identify::quantity::{Quantity, Unit};
 use crate::identify::series::Series;
 use crate::identify::start_stop::file::to_toml;
 use crate::identify::table::Table;
-use crate::offline::identify::starts::{StartLogs, StartStudy, page, study, text};
-use crate::offline::output::{make_folder, write_whole};
+use crate::report::identify::starts::{StartLogs, StartStudy, page, study, text};
+use crate::rows::output::{make_folder, write_whole};
 
 /// Litres a minute in mm³/s.
 const MM3_PER_S_PER_L_PER_MIN: f64 = 1e6 / 60.0;

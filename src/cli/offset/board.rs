@@ -5,12 +5,12 @@ use nalgebra::Vector2;
 
 use super::super::WrongArguments;
 use super::super::calibrate::{check_size, look_at};
-use super::super::cell::LoadedCell;
 use super::{OffsetArgs, tell};
-use crate::calib::offset::{Found, Gauge, OffsetError, Touch, find};
-use crate::config::cell::{Mount, Purpose};
+use crate::assembly::LoadedCell;
+use crate::calibration::offset::{Found, Gauge, OffsetError, Touch, find};
+use crate::cell::file::{Mount, Purpose};
+use crate::core::units::Mm;
 use crate::sim::view::gauge_middle;
-use crate::units::Mm;
 use crate::vision::Axis;
 
 /// Standard deviation of a place that somebody told by eye.

@@ -3,19 +3,19 @@
 use anyhow::Context;
 
 use super::super::WrongArguments;
-use super::super::cell::LoadedCell;
 use super::super::recorded::attached;
 use super::{OffsetArgs, tell};
-use crate::calib::Calibration;
-use crate::config::Cell;
-use crate::config::cell::Purpose;
-use crate::control::RobotState;
-use crate::control::offset::{EXPONENTS, Found, Search, find};
+use crate::assembly::LoadedCell;
+use crate::calibration::Calibration;
+use crate::cell::Cell;
+use crate::cell::file::Purpose;
+use crate::core::time::Stamp;
+use crate::core::units::Mm;
+use crate::identify::camera_offset::{EXPONENTS, Found, Search, find};
 use crate::io::recording::Recording;
-use crate::offline::offset::{Print, print};
-use crate::time::Stamp;
-use crate::units::Mm;
-use crate::vision::rank;
+use crate::numeric::rank;
+use crate::report::offset::{Print, print};
+use crate::width_control::RobotState;
 
 /// Largest offset that is tried unless another is given.
 const FARTHEST: Mm = Mm::constant(1000.0);

@@ -2,18 +2,18 @@
 
 use super::PlanArgs;
 use super::job::{Bead, wrong};
+use crate::assembly::{LoadedCell, extruder};
+use crate::cell::extruder::Strategy;
+use crate::cell::file::{ExtruderPart, Purpose, RunPart};
 use crate::cli::WrongArguments;
-use crate::cli::cell::{LoadedCell, extruder};
-use crate::config::cell::{ExtruderPart, Purpose, RunPart};
-use crate::config::extruder::Strategy;
 use crate::extruder::CommandLimits;
 use crate::extruder::demand::section;
 use crate::extruder::law::OperatingPoint;
 use crate::identify::file as model;
 use crate::io::record::ExtruderFile;
-use crate::model::TransferFunction;
-use crate::offline::planned::Facts;
+use crate::numeric::lti::TransferFunction;
 use crate::plan;
+use crate::report::planned::Facts;
 
 /// How long the flow that no model tells hangs together \[s\], as in the bead
 /// characterisation thesis.
@@ -70,7 +70,9 @@ impl Extruder {
                         flow, expected \"feedforward\" with model, library or mm3_per_turn";
             return Err(absent(what).into());
         };
-        let file = extruder::file(part, &name)?;
+        let mut warnings = Vec::new();
+        let file = extruder::strategy_file(part, &name, &mut warnings)?;
+        crate::cli::warn(&warnings);
         let behaviour = extruder::behaviour(keys, part, &name, file.as_ref())?;
         let identified = identified(file.as_ref())?;
         Self::of(args, (run, part), (name, identified), behaviour)

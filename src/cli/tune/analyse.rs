@@ -5,14 +5,14 @@ use std::path::Path;
 use anyhow::Context;
 
 use super::super::WrongArguments;
-use super::super::cell::LoadedCell;
 use super::super::offset::recording::gauge;
 use super::super::recorded::attached;
-use crate::config::cell::Purpose;
+use crate::assembly::LoadedCell;
+use crate::cell::file::Purpose;
+use crate::core::units::Mm;
 use crate::io::recording::{Entry, Recording};
-use crate::offline::tuned::Tuned;
+use crate::report::tuned::Tuned;
 use crate::tune::{Facts, Log, Plant};
-use crate::units::Mm;
 
 /// How far beyond the limits, as a factor, the target's speed may lie for anything to be
 /// foretold.

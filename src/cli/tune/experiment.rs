@@ -6,20 +6,20 @@ use std::process::ExitCode;
 use anyhow::Context;
 use toml_edit::{DocumentMut, value};
 
-use super::super::cell::LoadedCell;
 use super::super::run::{self, Until};
 use super::super::simulate::SimRecorder;
 use super::super::{Voice, outcome};
 use super::TuneArgs;
-use crate::config::cell::Purpose;
-use crate::control::steps::{Progress, StepSettings};
-use crate::control::{Event, Step};
+use crate::assembly::LoadedCell;
+use crate::cell::file::Purpose;
+use crate::core::time::Stamp;
+use crate::core::units::Mm;
 use crate::io::clock::RunClock;
 use crate::io::stop::StopSignal;
-use crate::offline::output;
+use crate::rows::output;
 use crate::sim::cell::{Sight, SimCell, Witness};
-use crate::time::Stamp;
-use crate::units::Mm;
+use crate::width_control::steps::{Progress, StepSettings};
+use crate::width_control::{Event, Step};
 
 /// Keys of `[control]` that only other laws know.
 pub const OF_DISTANCE: [&str; 3] = ["exponent", "exponent_learns", "drift_per_root_m"];
@@ -69,7 +69,7 @@ fn derived(args: &TuneArgs, loaded: &LoadedCell) -> anyhow::Result<LoadedCell> {
         LoadedCell::from_text(&loaded.path, document.to_string(), Purpose::Run)
     };
     if !args.simulated {
-        return read(&document);
+        return Ok(read(&document)?);
     }
     document["camera"]["source"] = value("rendered");
     let simulated = read(&document)?;
@@ -79,7 +79,7 @@ fn derived(args: &TuneArgs, loaded: &LoadedCell) -> anyhow::Result<LoadedCell> {
         tables.entry("simulation").or_insert_with(toml_edit::table);
         document["simulation"]["path_mm"] = value(needed.get().ceil());
     }
-    read(&document)
+    Ok(read(&document)?)
 }
 
 fn steps(loaded: &LoadedCell) -> anyhow::Result<StepSettings> {
@@ -128,7 +128,7 @@ fn announce(
 /// Lays the simulated bead until the camera has seen the last piece.
 fn simulate(out: &Path, loaded: &LoadedCell) -> anyhow::Result<()> {
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
-    let extruder = loaded.simulated_extruder()?;
+    let extruder = crate::cli::simulated_extruder(loaded)?;
     let recorder = SimRecorder::of(Some(&out.to_owned()), loaded)?;
     let calibration = loaded.calibration.clone();
     let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, recorder, extruder)?;

@@ -6,13 +6,13 @@ use anyhow::Context;
 use toml_edit::{DocumentMut, Item, Value, value};
 
 use super::super::WrongArguments;
-use super::super::cell::LoadedCell;
 use super::super::outcome::refuse_replacing;
 use super::Law;
 use super::experiment::OF_DISTANCE;
-use crate::config::cell::Purpose;
+use crate::assembly::LoadedCell;
+use crate::cell::file::Purpose;
 use crate::io::whole_file::write_whole;
-use crate::offline::tuned::Tuned;
+use crate::report::tuned::Tuned;
 
 /// Keys of the file that name another file.
 const PATHS: [(&str, &str); 7] = [

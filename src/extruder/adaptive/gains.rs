@@ -1,6 +1,6 @@
 //! What an adaptive law is set up with, and the conditions that it must keep.
 
-use crate::time::Span;
+use crate::core::time::Span;
 
 /// A first-order plant with a matched uncertainty: ẏ = a·y + b·(u + w + Δ),
 /// with the output y, the input u, the known part w and the unknown part Δ,

@@ -4,7 +4,7 @@ use nalgebra::Matrix4;
 
 use super::estimate::Estimate;
 use super::gains::{Adaptation, GainError, Gains, ScalarPlant, check};
-use crate::time::Span;
+use crate::core::time::Span;
 
 /// Samples that may be missed before the time between two is a gap.
 const GAP: f64 = 4.0;

@@ -1,8 +1,8 @@
 //! The speed that goes with the flow: bcs-thesis, figure 33, with an observer.
 
 use super::{FeedforwardError, FlowForecast, FlowObserver, FlowResidual, Inverse, positive};
-use crate::time::{Span, Stamp};
-use crate::units::{Mm2, Mm3PerS, MmPerS, Rpm};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm2, Mm3PerS, MmPerS, Rpm};
 
 /// From the extruder's command to the command of what moves the bead's bed (a
 /// wheel, a feed, a robot), so that the section stays as wanted.

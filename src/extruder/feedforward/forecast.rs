@@ -2,9 +2,9 @@
 //! speed.
 
 use super::{FeedforwardError, positive};
-use crate::model::{Between, ModelError, Simulator, TransferFunction};
-use crate::time::Span;
-use crate::units::{Mm3PerS, Rpm};
+use crate::core::time::Span;
+use crate::core::units::{Mm3PerS, Rpm};
+use crate::numeric::lti::{Between, ModelError, Simulator, TransferFunction};
 
 /// What an extruder does with its command.
 #[derive(Debug, Clone, PartialEq)]

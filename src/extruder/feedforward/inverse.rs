@@ -4,10 +4,10 @@
 use nalgebra::Complex;
 
 use super::FeedforwardError;
+use crate::core::time::Span;
 use crate::extruder::limits::{CommandLimit, CommandLimits};
-use crate::model::polynomial::{from_roots, multiply};
-use crate::model::{Between, Simulator, TransferFunction};
-use crate::time::Span;
+use crate::numeric::lti::polynomial::{from_roots, multiply};
+use crate::numeric::lti::{Between, Simulator, TransferFunction};
 
 /// How a model is inverted.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -10,8 +10,8 @@
 use nalgebra::{Matrix2, RowVector2, Vector2};
 
 use super::{FeedforwardError, positive};
-use crate::time::Stamp;
-use crate::units::Mm3PerS;
+use crate::core::time::Stamp;
+use crate::core::units::Mm3PerS;
 
 /// What the part is like.
 #[derive(Debug, Clone, Copy, PartialEq)]

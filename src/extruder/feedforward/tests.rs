@@ -1,8 +1,8 @@
 use super::*;
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm2, Mm3PerS, Rpm};
 use crate::extruder::limits::{CommandLimit, CommandLimits};
-use crate::model::{Between, FirstOrder, Simulator};
-use crate::time::{Span, Stamp};
-use crate::units::{Mm2, Mm3PerS, Rpm};
+use crate::numeric::lti::{Between, FirstOrder, Simulator};
 
 const PERIOD: Span = Span::from_millis(5);
 fn settings() -> InverseSettings {

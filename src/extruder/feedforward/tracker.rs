@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::inverse::{InverseSettings, minimum_phase};
 use super::{FeedforwardError, Inverse};
-use crate::model::{StateSpace, TransferFunction};
-use crate::time::Span;
+use crate::core::time::Span;
+use crate::numeric::lti::{StateSpace, TransferFunction};
 
 /// Periods of the command in one time constant of the placed poles: with fewer,
 /// the feedback, which is held over a period, swings.

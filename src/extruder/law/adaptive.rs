@@ -4,10 +4,10 @@
 //! plate, which is the robot's side.
 
 use super::{Need, Strategy, Unusable, Wish};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm2, Mm3PerS};
 use crate::extruder::adaptive::{AdaptiveLaw, ScalarPlant};
 use crate::extruder::report::ExtruderReport;
-use crate::time::{Span, Stamp};
-use crate::units::{Mm2, Mm3PerS};
 
 /// Metres in a millimetre.
 const M_PER_MM: f64 = 1e-3;
@@ -152,8 +152,8 @@ impl Strategy for AdaptiveNozzle {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::core::units::Mm2;
     use crate::extruder::adaptive::{Adaptation, Gains, Safety};
-    use crate::units::Mm2;
 
     fn law() -> AdaptiveNozzle {
         let plant = ScalarPlant { state_gain_per_s: -1.0, input_gain: 1.0 };

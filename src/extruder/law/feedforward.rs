@@ -2,10 +2,10 @@
 //! becomes the command that gives it. bcs-thesis, chapter 4.
 
 use super::{Need, Strategy, Unusable, Wish};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm3PerS, Rpm};
 use crate::extruder::feedforward::{FlowForecast, ScrewSpeed, Tracker};
 use crate::extruder::report::ExtruderReport;
-use crate::time::{Span, Stamp};
-use crate::units::{Mm3PerS, Rpm};
 
 /// How near to the flow that is wanted, as a share, the foretold one is when a plan is
 /// taken up.

@@ -2,10 +2,10 @@
 //! written down beforehand.
 
 use super::{Strategy, Unusable, Wish};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::Mm3PerS;
 use crate::extruder::report::ExtruderReport;
 use crate::identify::profile::Profile;
-use crate::time::{Span, Stamp};
-use crate::units::Mm3PerS;
 
 /// One command for as long as bead is laid, in the unit of the command.
 #[derive(Debug, Clone, Copy, PartialEq)]

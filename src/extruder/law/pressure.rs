@@ -3,6 +3,8 @@
 //! holds it. Ma et al. 2026.
 
 use super::{Need, Strategy, Unusable, Wish};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{MPa, Mm3PerS, Rpm};
 use crate::extruder::limits::{CommandLimit, CommandLimits};
 use crate::extruder::pressure::kalman::Noise;
 use crate::extruder::pressure::pi::{Pi, PiGains};
@@ -12,8 +14,6 @@ use crate::extruder::pressure::vsfc::{Vsfc, VsfcGains};
 use crate::extruder::pressure::{Fopdt, PressureLaw, Running};
 use crate::extruder::report::ExtruderReport;
 use crate::extruder::rheology::PowerLaw;
-use crate::time::{Span, Stamp};
-use crate::units::{MPa, Mm3PerS, Rpm};
 
 /// Which law holds the pressure.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,11 +3,11 @@
 //! 2015, eq. (74).
 
 use super::{Need, Strategy, Unusable, Wish};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::Mm3PerS;
 use crate::extruder::report::ExtruderReport;
 use crate::extruder::screw::control::ScrewSettings;
 use crate::extruder::screw::{ScrewControl, ScrewError, ScrewFault};
-use crate::time::{Span, Stamp};
-use crate::units::Mm3PerS;
 
 /// The control of the screw. What flows hangs on the filled length alone, whose
 /// setpoint stands in the cell.

@@ -1,6 +1,7 @@
 //! Laws under the supervisor, against plants.
 
 use super::*;
+use crate::core::units::{MPa, Mm, Mm2, Rpm};
 use crate::extruder::adaptive::{Adaptation, AdaptiveLaw, Gains, Safety, ScalarPlant};
 use crate::extruder::feedforward::{InverseSettings, RightZeros, Tracker};
 use crate::extruder::limits::CommandLimits;
@@ -16,10 +17,9 @@ use crate::extruder::screw::{FillLaw, PiecewiseExponential, Pulsation, ScrewDesi
 use crate::extruder::{
     Drive, ExtruderHold, ExtruderSetup, ExtruderState, Laying, PumpMode, Supervisor,
 };
-use crate::model::{Between, Simulator, TransferFunction};
+use crate::numeric::lti::{Between, Simulator, TransferFunction};
 use crate::sim::pressure::{Disturbed, SimPressure};
 use crate::sim::screw::{Integrator, SimScrew};
-use crate::units::{MPa, Mm, Mm2, Rpm};
 
 const TICK: Span = Span::from_millis(5);
 

@@ -3,9 +3,9 @@
 
 use super::kalman::Kalman;
 use super::{Command, Refused};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::{CommandLimit, CommandLimits};
-use crate::time::{Span, Stamp};
-use crate::units::{MPa, Rpm};
 
 /// What runs where a law takes over: the pressure, what is wanted, and the
 /// screw's speed. The law's first command at the same target is that speed.

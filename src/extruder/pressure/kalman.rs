@@ -2,7 +2,7 @@
 //! from readings. Ma et al. 2026, section 2.3.
 
 use super::{PressureError, within};
-use crate::units::MPa;
+use crate::core::units::MPa;
 
 /// Fewest readings that a noise is told from: its variance is then known to
 /// about a tenth.

@@ -5,9 +5,9 @@
 use super::calls::{Calls, Running, sane};
 use super::kalman::{Kalman, Noise};
 use super::{Command, PressureError, PressureLaw, Refused, within};
+use crate::core::time::Stamp;
+use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
-use crate::time::Stamp;
-use crate::units::{MPa, Rpm};
 
 /// Gains of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -13,9 +13,9 @@ use super::history::CommandHistory;
 use super::reference::{Reference, Way};
 use super::tuning::Tuning;
 use super::{Command, Fopdt, PressureLaw, Refused};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
-use crate::time::{Span, Stamp};
-use crate::units::{MPa, Rpm};
 
 /// The law with its memory.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,9 +8,9 @@ use super::kalman::{Kalman, Noise};
 use super::pi::{PiGains, PiMemory};
 use super::reference::Reference;
 use super::{Command, Fopdt, PressureLaw, Refused};
+use crate::core::time::Stamp;
+use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
-use crate::time::Stamp;
-use crate::units::{MPa, Rpm};
 
 /// What the commands under way are about to do, from the model.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,9 +9,9 @@ use super::smith::SmithPi;
 use super::tuning::Tuning;
 use super::vsfc::{Vsfc, VsfcGains};
 use super::*;
+use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
 use crate::sim::pressure::{Disturbed, SimPressure};
-use crate::units::{MPa, Rpm};
 
 const FASTEST: Rpm = Rpm::constant(3.0);
 const PERIOD: Span = Span::from_millis(50);

@@ -7,9 +7,9 @@ use super::kalman::{Kalman, Noise};
 use super::reference::FIRST_S;
 use super::smith::Smith;
 use super::{Command, Fopdt, PressureError, PressureLaw, Refused, within};
+use crate::core::time::Stamp;
+use crate::core::units::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
-use crate::time::Stamp;
-use crate::units::{MPa, Rpm};
 
 /// Gains and zones of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,8 +7,8 @@ use super::exact::{Exact, Overtaken, Prediction};
 use super::history::FeedHistory;
 use super::law::FillLaw;
 use super::model::{Conveying, Screw};
-use crate::time::{Span, Stamp};
-use crate::units::Mm;
+use crate::core::time::{Span, Stamp};
+use crate::core::units::Mm;
 
 const MM_PER_M: f64 = 1000.0;
 /// Most changes of the feed that are remembered.

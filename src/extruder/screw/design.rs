@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use super::error::{ScrewError, positive};
 use super::model::{Conveying, Pulsation, Screw};
-use crate::units::{Mm, Rpm};
+use crate::core::units::{Mm, Rpm};
 
 const MM_PER_M: f64 = 1000.0;
 

@@ -3,7 +3,7 @@
 
 use super::error::{ScrewError, positive};
 use super::model::Screw;
-use crate::units::Mm;
+use crate::core::units::Mm;
 
 const MM_PER_M: f64 = 1000.0;
 

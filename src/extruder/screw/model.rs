@@ -176,8 +176,8 @@ impl Screw {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::core::units::{Mm, Rpm};
     use crate::extruder::screw::{ScrewDesign, TurnUnit};
-    use crate::units::{Mm, Rpm};
 
     const B: Pulsation = Pulsation { share: 0.4, rad_per_s: 0.4, phase_rad: 0.0 };
 

@@ -1,8 +1,9 @@
 //! The start of a bead.
 
-use super::{Laid, StartStop};
-use crate::time::Span;
-use crate::units::Mm3PerS;
+use super::Laid;
+use crate::core::time::Span;
+use crate::core::units::Mm3PerS;
+use crate::identify::start_stop::parameters::StartStop;
 
 /// What came before a start.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,8 +1,9 @@
 //! The end of a bead.
 
-use super::{Laid, StartStop};
-use crate::time::Span;
-use crate::units::Mm;
+use super::Laid;
+use crate::core::time::Span;
+use crate::core::units::Mm;
+use crate::identify::start_stop::parameters::StartStop;
 
 /// A stop, from the moment when the pump is told to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 use super::*;
-use crate::time::Span;
+use crate::core::time::Span;
 
 const MACHINE: StartStop = StartStop {
     first_flow_s: 0.2,

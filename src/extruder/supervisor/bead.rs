@@ -1,10 +1,10 @@
 //! What begins a bead, goes on with it, and ends it.
 
 use super::{Phase, Supervisor};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::Mm3PerS;
 use crate::extruder::limits::CommandLimit;
 use crate::extruder::state::{ExtruderHold, ExtruderTrace};
-use crate::time::{Span, Stamp};
-use crate::units::Mm3PerS;
 
 impl Supervisor {
     /// Stops the pump early.

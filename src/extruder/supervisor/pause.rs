@@ -1,8 +1,8 @@
 //! Starts and stops of a bead, where the cell says how its extruder starts and stops.
 
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm, Mm3PerS, MmPerS};
 use crate::extruder::start_stop::{Pause, Start, Stop, Timing};
-use crate::time::{Span, Stamp};
-use crate::units::{Mm, Mm3PerS, MmPerS};
 
 /// Pause before the first bead of a run, of which nobody knows how long it was: all that
 /// can recede has.

@@ -1,8 +1,8 @@
 use super::*;
+use crate::core::units::Rpm;
 use crate::extruder::law::{Constant, Played};
 use crate::extruder::{ExtruderFault, ExtruderHold, PumpMode};
 use crate::identify::profile::{Point, Profile};
-use crate::units::Rpm;
 
 const TICK: Span = Span::from_millis(5);
 const FLOW: Mm3PerS = Mm3PerS::constant(500.0);

@@ -1,12 +1,12 @@
 //! What reports mean for the state: starts, holds, faults, and going on.
 
 use super::{Obedience, Phase, Supervisor};
-use crate::control::follow::Verdict;
+use crate::core::readback::Verdict;
+use crate::core::time::{Span, Stamp};
 use crate::extruder::Drive;
 use crate::extruder::law::Need;
 use crate::extruder::report::{ExtruderReport, PumpMode};
 use crate::extruder::state::{ExtruderFault, ExtruderHold};
-use crate::time::{Span, Stamp};
 
 /// Share of the highest pressure below which it has fallen.
 const FALLEN: f64 = 0.95;

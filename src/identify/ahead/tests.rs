@@ -7,7 +7,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::*;
 use crate::identify::excitation::{Excitation, Shape};
 use crate::identify::fit::Before;
-use crate::model::{Between, TransferFunction, simulate};
+use crate::numeric::lti::{Between, TransferFunction, simulate};
 
 const DT_S: f64 = 0.05;
 

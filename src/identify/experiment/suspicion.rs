@@ -1,6 +1,6 @@
 //! Values that can hardly be what they are said to be.
 
-use crate::identify::quantity::Unit;
+use crate::core::quantity::Unit;
 
 /// No extruder works beyond this, in megapascal.
 const MOST_MPA: f64 = 150.0;

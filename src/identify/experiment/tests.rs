@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 use super::*;
-use crate::identify::quantity::Unit;
+use crate::core::quantity::Unit;
 
 /// Ten seconds at 100 Hz of a screw that is stepped, and a flow that follows.
 fn columns() -> [Vec<f64>; 3] {

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::{Fit, ModelFile, Setting, Uncertainty};
-use crate::identify::quantity::Quantity;
+use crate::core::quantity::Quantity;
 
 /// The text of a model's file; each note becomes a comment at its head. Numbers
 /// keep every digit.

@@ -3,7 +3,7 @@
 use super::loose::Loose;
 use super::samples::SamplesError;
 use crate::identify::number::{brief, short};
-use crate::model::ModelError;
+use crate::numeric::lti::ModelError;
 
 /// Why there is no fit, with what was found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -7,7 +7,7 @@ use nalgebra::{Complex, DMatrix};
 use super::named::Named;
 use super::problem::Problem;
 use super::spread::Spread;
-use crate::model::polynomial;
+use crate::numeric::lti::polynomial;
 
 /// By how many standard errors a coefficient must differ from zero.
 const SEEN_SIGMAS: f64 = 2.0;

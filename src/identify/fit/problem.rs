@@ -8,7 +8,7 @@
 
 use super::samples::Samples;
 use super::settings::{Before, DeadTime, Level, Settings};
-use crate::model::{Between, ModelError, Simulator, TransferFunction, polynomial};
+use crate::numeric::lti::{Between, ModelError, Simulator, TransferFunction, polynomial};
 
 /// A pole faster than this many in a step is not seen.
 const FASTEST_PER_STEP: f64 = 50.0;

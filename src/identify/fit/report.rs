@@ -13,7 +13,7 @@ use super::samples::Samples;
 use super::settings::{Before, DeadTime, Settings};
 use super::spread::{Colour, Spread, spread};
 use super::start;
-use crate::model::{Simulator, TransferFunction, polynomial};
+use crate::numeric::lti::{Simulator, TransferFunction, polynomial};
 
 /// A parameter that was estimated.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,7 @@
 use super::MOST_POLES;
 use super::error::FitError;
 use super::samples::Samples;
-use crate::model::Between;
+use crate::numeric::lti::Between;
 
 /// Form of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,7 +7,7 @@ use super::error::FitError;
 use super::levenberg::{Outcome, descend, fill_linear, nearest};
 use super::problem::Problem;
 use super::settings::{DeadTime, Level};
-use crate::model::{Between, Simulator, TransferFunction, polynomial};
+use crate::numeric::lti::{Between, Simulator, TransferFunction, polynomial};
 
 /// Bandwidths of the filter, evenly spread in their logarithm.
 const BANDWIDTHS: u32 = 5;

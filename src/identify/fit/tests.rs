@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
 use crate::identify::prbs::Prbs;
-use crate::model::{FirstOrder, TransferFunction, simulate};
+use crate::numeric::lti::{FirstOrder, TransferFunction, simulate};
 
 mod accuracy;
 mod many;

@@ -4,7 +4,7 @@
 use std::fmt::Write;
 
 use super::{Point, Profile, ProfileError};
-use crate::identify::quantity::Quantity;
+use crate::core::quantity::Quantity;
 use crate::identify::table::{Table, TableError};
 
 /// The column of time.
@@ -77,7 +77,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
     use super::*;
-    use crate::identify::quantity::Unit;
+    use crate::core::quantity::Unit;
 
     #[test]
     fn what_is_written_is_read_again() {

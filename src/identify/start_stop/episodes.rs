@@ -4,7 +4,7 @@
 use super::StartStopFitError;
 use crate::identify::grid::usual_step;
 use crate::identify::series::Series;
-use crate::vision::rank;
+use crate::numeric::rank;
 
 /// A command above this share of its largest value runs the pump.
 const RUNS_SHARE: f64 = 0.05;

@@ -3,8 +3,8 @@
 
 use super::episodes::Episode;
 use super::least::descend;
+use super::parameters::StartStop;
 use super::{SeenStop, StartStopFitError};
-use crate::extruder::start_stop::StartStop;
 
 /// Parameters of a fall; see [`StartStop`].
 #[derive(Debug, Clone, Copy, PartialEq)]

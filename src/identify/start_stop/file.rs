@@ -1,8 +1,8 @@
 //! The file of starts and stops, `starts.toml`. Version 1.
 
 use super::StartStopFit;
+use super::parameters::StartStop;
 use crate::document::{Document, Problems, Table};
-use crate::extruder::start_stop::StartStop;
 use crate::identify::file::{Setting, number, put, put_setting, read_setting, row};
 
 /// A parameter as files and tables name it.

@@ -4,9 +4,9 @@
 use super::episodes::Episode;
 use super::fall::Falling;
 use super::least::descend;
+use super::parameters::StartStop;
 use super::{SeenStart, StartStopFitError};
-use crate::extruder::start_stop::StartStop;
-use crate::vision::rank;
+use crate::numeric::rank;
 
 /// What was found of the starts.
 #[derive(Debug, Clone)]

@@ -1,9 +1,9 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 use super::*;
+use crate::core::time::Span;
+use crate::core::units::{Mm3PerS, MmPerS};
 use crate::extruder::start_stop::{Laid, Pause, Timing};
-use crate::time::Span;
-use crate::units::{Mm3PerS, MmPerS};
 
 const MACHINE: StartStop = StartStop {
     first_flow_s: 0.2,

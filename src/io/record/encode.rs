@@ -8,10 +8,10 @@ use crossbeam_channel::{Receiver, Sender};
 use prost::Message as _;
 
 use super::Shared;
-use crate::frame::Frame;
+use crate::core::frame::Frame;
+use crate::core::time::Stamp;
 use crate::io::foxglove::{CompressedImage, timestamp};
 use crate::io::image_file::{EncodeError, encode_png};
-use crate::time::Stamp;
 
 /// What the encoder is given.
 pub enum FrameJob {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::control::{Event, Step};
+use crate::width_control::{Event, Step};
 
 /// Version of this layout. A reader refuses a newer one.
 pub const FORMAT_VERSION: u32 = 1;

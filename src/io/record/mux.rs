@@ -16,8 +16,8 @@ use super::format::{
     RunInfo, STEP_SCHEMA, STEP_TOPIC, StepMessage,
 };
 use super::{Answered, Counts};
+use crate::core::time::Stamp;
 use crate::io::foxglove;
-use crate::time::Stamp;
 
 /// Bytes of a chunk before compression; the flush period usually ends a chunk
 /// sooner.

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::format::{FILE_NAME, PARTIAL_NAME};
-use crate::ports::RecordError;
+use crate::run::ports::RecordError;
 
 /// A file that grows at its end.
 pub trait Sink: Write + Send {

@@ -7,8 +7,8 @@ use crossbeam_channel::Sender;
 
 use super::Shared;
 use super::encode::FrameJob;
-use crate::config::cell::KeepFrames;
-use crate::frame::Frame;
+use crate::cell::file::KeepFrames;
+use crate::core::frame::Frame;
 
 /// Gives frames to the recorder, from any thread.
 #[derive(Clone)]

@@ -1,11 +1,11 @@
 use std::io::Cursor;
 
 use super::*;
-use crate::control::{RobotLimits, RobotMode, RobotState, State, Trace};
-use crate::frame::{Channel, Pixels};
+use crate::core::frame::{Channel, Pixels};
+use crate::core::units::{Mm, MmPerS};
 use crate::io::image_file;
 use crate::io::recording::{Entry, Recording};
-use crate::units::{Mm, MmPerS};
+use crate::width_control::{RobotLimits, RobotMode, RobotState, State, Trace};
 
 mod disk;
 mod trouble;

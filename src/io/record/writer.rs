@@ -11,7 +11,7 @@ use super::encode::EncodedFrame;
 use super::mux::{Mux, MuxError};
 use super::sink::{Outlet, Sink};
 use super::{Answered, Counts, RecordReport, Shared, Tuning};
-use crate::ports::RecordError;
+use crate::run::ports::RecordError;
 
 /// What the writer listens to.
 pub struct Inputs {

@@ -2,10 +2,10 @@ use std::io::Cursor;
 use std::sync::Arc;
 
 use super::*;
-use crate::config::cell::KeepFrames;
-use crate::frame::{Frame, Pixels};
+use crate::cell::file::KeepFrames;
+use crate::core::frame::{Frame, Pixels};
 use crate::io::record::{RecordConfig, start};
-use crate::ports::Recorder;
+use crate::run::ports::Recorder;
 
 const EVENTS: u64 = 800;
 

@@ -1,11 +1,11 @@
 //! What the robot does with a line of the PC.
 
 use super::{Doing, RobotCell};
+use crate::core::time::Stamp;
+use crate::core::units::MmPerS;
 use crate::link::count::{Clock, Refusal};
 use crate::link::robot_line::mode_word;
 use crate::link::{ErrCode, PcLine, RobotLine, RobotParams};
-use crate::time::Stamp;
-use crate::units::MmPerS;
 
 impl RobotCell {
     /// Takes a line of the PC; the answer is `HELLO`, or `ERR` where the line

@@ -1,11 +1,11 @@
 //! Lines from the extruder to the PC.
 
 use super::{decimal, switch};
+use crate::core::units::{MPa, Mm, Mm3PerS, Rpm};
 use crate::extruder::{Drive, ExtruderReport, PumpMode};
 use crate::link::VERSION;
 use crate::link::fields::{Fields, LineError};
 use crate::link::robot_line::{ErrCode, format_err, one_word, parse_err};
-use crate::units::{MPa, Mm, Mm3PerS, Rpm};
 
 const KEYWORDS: &str = "HELLO, STATE or ERR";
 

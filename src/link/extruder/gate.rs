@@ -3,10 +3,10 @@
 //! behind it.
 
 use super::{DriveLine, ExtruderHello, ExtruderLine, ExtruderStatus};
+use crate::core::time::Stamp;
 use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
 use crate::link::ErrCode;
 use crate::link::count::{Clock, Count, Refusal};
-use crate::time::Stamp;
 
 const NS_PER_MS: u64 = 1_000_000;
 /// What stands without a command.

@@ -2,12 +2,12 @@
 //! the operator is told of it.
 
 use super::{Ending, Loop};
-use crate::control::{Event, Step};
+use crate::core::time::{Span, Stamp};
+use crate::drivers::extruder::{ExtruderConfig, ExtruderEvent};
 use crate::extruder::{ExtruderState, PumpMode};
-use crate::io::extruder::{ExtruderConfig, ExtruderEvent};
 use crate::link::ErrCode;
-use crate::offline::names;
-use crate::time::{Span, Stamp};
+use crate::rows::names;
+use crate::width_control::{Event, Step};
 
 /// What the control thread keeps of its extruder.
 pub struct ExtruderWatch {

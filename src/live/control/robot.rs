@@ -4,11 +4,11 @@
 use std::sync::atomic::Ordering;
 
 use super::{Ending, Loop};
-use crate::control::limiter::Limits;
-use crate::control::{Command, RobotLimits};
-use crate::io::robot::{LinkClient, RobotEvent, Written};
-use crate::ports::RobotPort;
-use crate::time::Stamp;
+use crate::core::time::Stamp;
+use crate::drivers::robot::{LinkClient, RobotEvent, Written};
+use crate::run::ports::RobotPort;
+use crate::width_control::limiter::Limits;
+use crate::width_control::{Command, RobotLimits};
 
 /// The link as the runner's robot, which remembers when it last wrote.
 pub struct LinkPort {

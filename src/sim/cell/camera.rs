@@ -3,21 +3,21 @@
 
 use nalgebra::Vector2;
 
-use crate::calib::{Calibration, SurfaceMap};
-use crate::config::Cell;
-use crate::config::cell::Mount;
-use crate::config::rendered::Level;
-use crate::control::Step;
-use crate::frame::Frame;
-use crate::geometry::ImagePoint;
+use crate::calibration::{Calibration, SurfaceMap};
+use crate::cell::Cell;
+use crate::cell::file::Mount;
+use crate::core::frame::Frame;
+use crate::core::geometry::ImagePoint;
+use crate::core::time::Stamp;
+use crate::core::units::{Mm, MmPerS};
+use crate::scenario::table::Level;
 use crate::sim::hash;
 use crate::sim::laid::LaidBead;
 use crate::sim::render::{RenderError, Renderer};
 use crate::sim::truth::Truth;
 use crate::sim::view::gauge_middle;
-use crate::time::Stamp;
-use crate::units::{Mm, MmPerS};
 use crate::vision::{Axis, Edges, Hints, Measurer, Reject, WidthMeasurement};
+use crate::width_control::Step;
 
 /// What the camera saw, for a witness.
 #[derive(Debug)]

@@ -1,9 +1,9 @@
 //! The clocks of a simulated cell, and which of them strikes next.
 
-use crate::config::Cell;
-use crate::config::cell::RunPart;
+use crate::cell::Cell;
+use crate::cell::file::RunPart;
+use crate::core::time::{Span, Stamp};
 use crate::sim::hash;
-use crate::time::{Span, Stamp};
 
 /// What comes next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use super::*;
-use crate::calib::Calibration;
-use crate::config::cell::Purpose;
-use crate::control::Step;
+use crate::calibration::Calibration;
+use crate::cell::file::Purpose;
 use crate::extruder::law::Constant;
 use crate::extruder::start_stop::{Laid, Timing};
 use crate::extruder::{ExtruderSetup, Law};
 use crate::identify::start_stop::file;
-use crate::runner::NoRecorder;
+use crate::run::runner::NoRecorder;
+use crate::width_control::Step;
 
 const CELL: &str = include_str!("../../../cells/starts.toml");
 const STARTS: &str = include_str!("../../../models/starts/simulated.toml");

@@ -1,9 +1,9 @@
 //! Who is told what happens in a simulated cell.
 
 use super::camera::Sight;
-use crate::control::{Event, Step};
-use crate::time::Stamp;
-use crate::units::Mm3PerS;
+use crate::core::time::Stamp;
+use crate::core::units::Mm3PerS;
+use crate::width_control::{Event, Step};
 
 /// Is told what happens in a simulated cell.
 pub trait Witness {

@@ -2,11 +2,11 @@
 //! length. It stands while the pump does, and so does all that is on its way.
 
 use super::{Plant, STEP};
-use crate::config::extruder::ScrewPlant as Settings;
+use crate::cell::extruder::ScrewPlant as Settings;
+use crate::core::units::{Mm, Mm3PerS};
 use crate::extruder::ExtruderReport;
 use crate::sim::hash::{mix, normal_pair};
 use crate::sim::screw::{Integrator, SimScrew};
-use crate::units::{Mm, Mm3PerS};
 
 const SENSOR: u64 = 0x0073_6372_6577;
 /// Largest share that can be fed: a full screw has no filled length.

@@ -2,11 +2,11 @@
 //! unknown input, and a flow that wanders.
 
 use super::{Plant, STEP};
-use crate::config::extruder::LinearPlant;
+use crate::cell::extruder::LinearPlant;
+use crate::core::units::{Mm3PerS, Rpm};
 use crate::extruder::ExtruderReport;
-use crate::model::{Between, ModelError, Simulator};
+use crate::numeric::lti::{Between, ModelError, Simulator};
 use crate::sim::hash::{mix, normal_pair};
-use crate::units::{Mm3PerS, Rpm};
 
 /// Keeps the random numbers of flow and sensor apart from others of a seed.
 const FLOW: u64 = 0x0000_666c_6f77;

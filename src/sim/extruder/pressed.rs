@@ -2,12 +2,12 @@
 //! presses out: the plant of Ma et al. 2026 as an extruder.
 
 use super::{Plant, STEP};
-use crate::config::extruder::PressurePlant;
+use crate::cell::extruder::PressurePlant;
+use crate::core::units::{MPa, Mm3PerS, Rpm};
 use crate::extruder::ExtruderReport;
 use crate::extruder::pressure::Running;
 use crate::extruder::rheology::PowerLaw;
 use crate::sim::pressure::{Disturbed, Drift, Load, SimPressure, TICK_S};
-use crate::units::{MPa, Mm3PerS, Rpm};
 
 /// The plant with its nozzle.
 #[derive(Debug)]

@@ -1,8 +1,8 @@
 use nalgebra::Vector3;
 
 use super::*;
-use crate::calib::Camera;
-use crate::geometry::{Pose, Roi};
+use crate::calibration::Camera;
+use crate::core::geometry::{Pose, Roi};
 use crate::vision::Polarity;
 
 mod disturbed;

@@ -1,8 +1,8 @@
 //! Beads with pauses between them, laid by the rules of a strategy.
 
 use super::melt::{Machine, Melt};
+use crate::core::time::Span;
 use crate::extruder::start_stop::{Laid, Pause, Timing};
-use crate::time::Span;
 
 /// How starts and stops are timed.
 pub trait Strategy {

@@ -4,7 +4,7 @@
 use nalgebra::Vector2;
 
 use super::{NODES, Scene};
-use crate::geometry::SurfacePoint;
+use crate::core::geometry::SurfacePoint;
 use crate::vision::curve::Curve;
 
 /// Distance of the places from which an edge's direction and bend on the

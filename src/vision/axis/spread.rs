@@ -2,8 +2,8 @@
 
 use super::sections::Sections;
 use super::{Memory, Scene, Side};
+use crate::numeric::number::float;
 use crate::vision::curve::Curve;
-use crate::vision::number::float;
 use crate::vision::scatter;
 use crate::vision::trace::Located;
 use crate::vision::waviness::{CURVED, Evidence, Midline, ORDERS, Waves, legendre, norm};

@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::number::{float, narrow, whole};
-use super::super::rank;
-use super::super::step::StepTable;
 use super::{LAST_PX, LONGEST_PX, MAX_STEPS, MIN_HALF_PX, WINDOW};
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::{float, narrow, whole};
+use crate::numeric::rank;
 
 /// Standard deviations of the ground's level within which that beside an edge is
 /// ground's.
@@ -234,7 +234,7 @@ mod tests {
     }
 
     fn whole(place: f64) -> usize {
-        super::super::whole(narrow(place.floor()))
+        crate::numeric::number::whole(narrow(place.floor()))
     }
 
     #[test]

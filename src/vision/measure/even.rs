@@ -1,9 +1,9 @@
 //! Whether what lies between two rough edges is one bead: as bright beside either edge
 //! as in its middle.
 
+use crate::numeric::number::single;
+use crate::numeric::number::whole;
 use crate::vision::coarse::LinePair;
-use crate::vision::number::single;
-use crate::vision::number::whole;
 use crate::vision::reject::Reject;
 use crate::vision::rough::RoughFit;
 use crate::vision::strip::{Grey, Strip};

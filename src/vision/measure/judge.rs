@@ -2,11 +2,11 @@
 //! and steps that are too low.
 
 use super::{Way, Work};
+use crate::numeric::number::float;
+use crate::numeric::rank;
 use crate::vision::gauge::EdgeKind;
 use crate::vision::ground::{Place, Side};
-use crate::vision::number::float;
 use crate::vision::outlier;
-use crate::vision::rank;
 use crate::vision::reject::Reject;
 use crate::vision::strip::{Grey, Strip};
 use crate::vision::trace::Tracer;

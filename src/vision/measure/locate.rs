@@ -4,16 +4,16 @@
 use super::judge::is_strange;
 use super::search::Found;
 use super::{NEED_SHARE, OFF_PX, Way, Work};
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::narrow;
+use crate::numeric::rank;
 use crate::vision::covered;
 use crate::vision::light;
 use crate::vision::motion::BlurShapes;
 use crate::vision::noise::PixelNoise;
-use crate::vision::number::narrow;
 use crate::vision::overlay::Look;
-use crate::vision::rank;
 use crate::vision::reject::Reject;
 use crate::vision::saturated;
-use crate::vision::step::StepTable;
 use crate::vision::strip::{Grey, Strip};
 use crate::vision::trace::{Scene, Tracer};
 

@@ -2,11 +2,11 @@
 
 use super::patterned::{check_pattern, doubt_of_blur};
 use super::{NEED_SHARE, Work, even};
-use crate::calib::SurfaceMap;
+use crate::calibration::SurfaceMap;
+use crate::numeric::number::{float, narrow};
 use crate::vision::coarse::{LinePair, StepLine};
 use crate::vision::gauge::{EdgeKind, Polarity};
 use crate::vision::line::Line;
-use crate::vision::number::{float, narrow};
 use crate::vision::pool;
 use crate::vision::reject::Reject;
 use crate::vision::rough::{RoughFit, Scene};

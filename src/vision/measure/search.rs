@@ -2,7 +2,7 @@
 //! the bead's two edges.
 
 use super::{NEED_SHARE, Work};
-use crate::calib::SurfaceMap;
+use crate::calibration::SurfaceMap;
 use crate::vision::contour::Contours;
 use crate::vision::edge::{Candidates, REACH, respond};
 use crate::vision::gauge::Polarity;

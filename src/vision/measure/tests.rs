@@ -1,9 +1,9 @@
 use super::*;
-use crate::calib::{Calibration, Camera};
-use crate::frame::Pixels;
-use crate::geometry::{Pose, Roi};
-use crate::time::Stamp;
-use crate::units::Mm;
+use crate::calibration::{Calibration, Camera};
+use crate::core::frame::Pixels;
+use crate::core::geometry::{Pose, Roi};
+use crate::core::time::Stamp;
+use crate::core::units::Mm;
 use crate::vision::gauge::{Axis, EdgeKind, Polarity};
 use nalgebra::Vector3;
 use rand::SeedableRng;

@@ -4,8 +4,8 @@
 
 use super::Overlay;
 use super::shape::{Beside, Flanks, Shading, Step};
-use crate::vision::normal::Normal;
-use crate::vision::step::StepTable;
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::normal_equations::Normal;
 
 /// Farthest that a parabola follows the surroundings \[px\].
 const FARTHEST_PX: f64 = 32.0;

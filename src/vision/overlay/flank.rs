@@ -5,8 +5,8 @@ use nalgebra::SVector;
 
 use super::Overlay;
 use super::shape::{Extent, LEAST_BLUR_PX, Look, MAX_STEPS, SHADING_SD, Step, place_limit};
-use crate::vision::normal::Normal;
-use crate::vision::step::StepTable;
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::normal_equations::Normal;
 
 /// Unknowns: place, blur, levels and shading of the edge, then place, height and
 /// blur of what lies before it and after it.

@@ -5,9 +5,9 @@ use nalgebra::SVector;
 
 use super::shape::Look;
 use super::{Overlay, PHASES};
-use crate::vision::normal::Normal;
-use crate::vision::number::float;
-use crate::vision::step::StepTable;
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::normal_equations::Normal;
+use crate::numeric::number::float;
 
 /// Place and blur of the step, its two levels, and the shading before and after it.
 const UNKNOWNS: usize = 6;

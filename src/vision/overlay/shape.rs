@@ -5,9 +5,9 @@ use super::flank::Flank;
 pub(super) use super::flank::Flanks;
 use super::slopes::Slopes;
 use super::{Overlay, REACH, ROUNDING};
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::float;
 use crate::vision::line::Line;
-use crate::vision::number::float;
-use crate::vision::step::StepTable;
 
 pub const LEAST_BLUR_PX: f64 = 0.3;
 const MOST_BLUR_PX: f64 = 15.0;

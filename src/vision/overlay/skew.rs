@@ -4,9 +4,9 @@
 
 use super::Overlay;
 use super::shape::{Look, SHADING_SD};
-use crate::vision::normal::Normal;
-use crate::vision::number::float;
-use crate::vision::step::StepTable;
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::normal_equations::Normal;
+use crate::numeric::number::float;
 
 /// Unknowns of a blurred step with its shading, and the bump.
 const UNKNOWNS: usize = 7;

@@ -1,9 +1,9 @@
 use super::*;
-use crate::frame::{Frame, Pixels};
-use crate::geometry::Roi;
-use crate::time::Stamp;
+use crate::core::frame::{Frame, Pixels};
+use crate::core::geometry::Roi;
+use crate::core::time::Stamp;
+use crate::numeric::blurred_step::StepTable;
 use crate::vision::gauge::Axis;
-use crate::vision::step::StepTable;
 use crate::vision::strip::{Strips, Turner, View};
 
 const ROWS: usize = 100;

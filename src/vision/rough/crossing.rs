@@ -1,8 +1,8 @@
 //! Where a row passes from what lies outside to the bead.
 
-use super::whole;
 use super::window::Row;
-use crate::vision::number::single;
+use crate::numeric::number::single;
+use crate::numeric::number::whole;
 use crate::vision::sheet::SPAN;
 
 /// How far inside the edge's course a row is summed \[px\]: beyond a usual flank.

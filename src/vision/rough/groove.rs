@@ -3,10 +3,10 @@
 //! known of other grooves then says how wide it is.
 
 use super::levels::{LENGTH, MeanProfile, OUTSIDE};
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::normal_equations::{Normal, Solved};
+use crate::numeric::number::float;
 use crate::vision::gauge::EdgeKind;
-use crate::vision::normal::{Normal, Solved};
-use crate::vision::number::float;
-use crate::vision::step::StepTable;
 use crate::vision::vectors;
 use nalgebra::SVector;
 

@@ -4,11 +4,11 @@
 use super::Scene;
 use super::crossing::{self, Crossing, Flank};
 use super::kernel;
-use super::whole;
 use super::window::{BLOCK_ROWS, STRAIGHT_ROWS, Windows};
+use crate::numeric::number::whole;
+use crate::numeric::number::{float, single};
+use crate::numeric::rank;
 use crate::vision::gauge::EdgeKind;
-use crate::vision::number::{float, single};
-use crate::vision::rank;
 use crate::vision::sheet::SPAN;
 
 /// Pixels outside that are searched for what the bead stands against: a groove's

@@ -3,9 +3,9 @@
 use super::Scene;
 use super::crossing::INSIDE_PX;
 use super::levels::{Crossings, DEPTH_SIGMA, LENGTH, Levels, OUTSIDE, Profile};
-use super::whole;
 use super::window::Windows;
-use crate::vision::number::{float, narrow};
+use crate::numeric::number::whole;
+use crate::numeric::number::{float, narrow};
 use crate::vision::strip::Grey;
 
 /// Blocks over which texture is taken to be correlated at most.

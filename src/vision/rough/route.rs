@@ -1,10 +1,10 @@
 //! The course of an edge through its windows: the strongest step from dark to
 //! bright that runs along the bead, by dynamic programming over blocks of rows.
 
-use super::whole;
 use super::window::{Row, Windows};
-use crate::vision::number::single;
-use crate::vision::rank;
+use crate::numeric::number::single;
+use crate::numeric::number::whole;
+use crate::numeric::rank;
 use crate::vision::sheet::SPAN;
 
 /// Pixels on either side that are compared for a step, as a fraction of the

@@ -2,8 +2,8 @@
 //! the brighter side, and smoothed.
 
 use super::{Scene, kernel};
+use crate::numeric::number::{float, narrow};
 use crate::vision::coarse::StepLine;
-use crate::vision::number::{float, narrow};
 use crate::vision::sheet::{SPAN, Sheet};
 use crate::vision::strip::Grey;
 

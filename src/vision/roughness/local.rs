@@ -2,8 +2,8 @@
 
 use nalgebra::Vector2;
 
-use crate::calib::SurfaceMap;
-use crate::geometry::SurfacePoint;
+use crate::calibration::SurfaceMap;
+use crate::core::geometry::SurfacePoint;
 use crate::vision::width::Caliper;
 
 /// Largest fraction of the lines that may be missing: the others stand in for them.
@@ -139,13 +139,13 @@ fn fill(lines: usize, sections: &[Section], value: impl Fn(&Section) -> f64) -> 
 }
 
 fn count(number: usize) -> f64 {
-    crate::vision::number::float(number)
+    crate::numeric::number::float(number)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::ImagePoint;
+    use crate::core::geometry::ImagePoint;
     use crate::vision::width::EdgePlace;
 
     /// A bead of 40 px that slants, whose lines 3 and 4 are missing.

@@ -2,8 +2,8 @@
 //! two frames that show the same piece have the same widths there.
 
 use super::local::LocalWidths;
-use crate::units::Mm;
-use crate::vision::number::float;
+use crate::core::units::Mm;
+use crate::numeric::number::float;
 
 /// Smallest part of the gauge that two frames must share to be compared.
 const MIN_SHARED: f64 = 0.3;

@@ -9,7 +9,7 @@
 use std::f64::consts::PI;
 
 use super::local::LocalWidths;
-use crate::vision::number::float;
+use crate::numeric::number::float;
 
 /// Correlation lengths are looked for from this fraction of the lines' distance, or of
 /// the smoothing, up to one gauge.

@@ -3,7 +3,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
-use crate::vision::number::float;
+use crate::numeric::number::float;
 
 const SPACING_MM: f64 = 4.0;
 const LINES: usize = 25;

@@ -2,7 +2,7 @@
 //! weighted so that the texture disturbs it least.
 
 use super::{LANES, MAX_CHUNKS, PHASES, Template};
-use crate::vision::number::float;
+use crate::numeric::number::float;
 use crate::vision::texture::Texture;
 use crate::vision::whiten::{MOST, Whitener};
 

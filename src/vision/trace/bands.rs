@@ -3,9 +3,10 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::rows::Group;
-use super::{Located, NEAR_ENOUGH, Scene, Tracer, float, narrow};
+use super::{Located, NEAR_ENOUGH, Scene, Tracer};
+use crate::numeric::number::{float, narrow};
+use crate::numeric::rank;
 use crate::vision::pool;
-use crate::vision::rank;
 use crate::vision::strip::Grey;
 
 /// Share of the plain pixels that must be as they are expected for their level

@@ -1,8 +1,9 @@
 //! Levels on either side of an edge, band by band.
 
-use super::{Extent, Scene, Tracer, narrow};
+use super::{Extent, Scene, Tracer};
+use crate::numeric::number::narrow;
+use crate::numeric::rank;
 use crate::vision::path;
-use crate::vision::rank;
 use crate::vision::strip::Grey;
 
 /// Where levels are picked first: distance from the edge, and apart \[px\].

@@ -4,9 +4,10 @@
 use nalgebra::Matrix3;
 
 use super::bands::BandSums;
-use super::{MANY_SIGMA, Scene, Tracer, float, narrow};
+use super::{MANY_SIGMA, Scene, Tracer};
+use crate::numeric::number::{float, narrow};
+use crate::numeric::rank;
 use crate::vision::pool;
-use crate::vision::rank;
 use crate::vision::strip::Grey;
 use crate::vision::template::{Expected, PlainSums, RowSums};
 

@@ -1,14 +1,15 @@
 //! An edge that grains or spots cover in part: which rows show it and nothing
 //! else. All that is known of it is taken from those rows alone.
 
-use super::{CLEAR_FIT, MANY_SIGMA, State, Tracer, narrow, typical};
+use super::{CLEAR_FIT, MANY_SIGMA, State, Tracer, typical};
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::narrow;
+use crate::numeric::number::single;
+use crate::numeric::rank;
 use crate::vision::agree::agree;
-use crate::vision::number::single;
 use crate::vision::overlay::{Extent, Shape};
 use crate::vision::path;
 use crate::vision::pool;
-use crate::vision::rank;
-use crate::vision::step::StepTable;
 use crate::vision::strip::Grey;
 use crate::vision::template::{PlainSums, Template};
 use crate::vision::trace::Scene;

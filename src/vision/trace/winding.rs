@@ -1,13 +1,14 @@
 //! An edge that winds more quickly than the bands of the first pick show it, as that of
 //! a rough bead does in a tall gauge: it is picked anew, caliper line by caliper line.
 
-use super::{COVERED_SHARE, Look, Scene, Tracer, narrow, typical};
-use crate::vision::number::single;
+use super::{COVERED_SHARE, Look, Scene, Tracer, typical};
+use crate::numeric::blurred_step::StepTable;
+use crate::numeric::number::narrow;
+use crate::numeric::number::single;
+use crate::numeric::rank;
 use crate::vision::path;
 use crate::vision::pool;
-use crate::vision::rank;
 use crate::vision::sheet::{MIDDLE, PLENTY, SPAN, Window};
-use crate::vision::step::StepTable;
 use crate::vision::strip::Grey;
 
 /// How far a band lies off the line between its neighbours from which on an edge winds

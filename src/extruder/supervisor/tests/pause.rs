@@ -1,7 +1,8 @@
 //! Starts and stops of an extruder that is known to start and to stop late.
 
 use super::*;
-use crate::extruder::start_stop::{Laid, StartStop};
+use crate::extruder::start_stop::Laid;
+use crate::identify::start_stop::parameters::StartStop;
 
 const SPEED: MmPerS = MmPerS::constant(50.0);
 const MACHINE: StartStop = StartStop {

@@ -3,7 +3,7 @@
 use rand::RngExt;
 
 use super::*;
-use crate::model::{Between, Simulator, polynomial};
+use crate::numeric::lti::{Between, Simulator, polynomial};
 
 /// A plant of one to three poles with time constants of 0.1 to 5 s, damped or not,
 /// zeros on either side, and a dead time of up to 1.5 s; gains and levels of all

@@ -1,7 +1,9 @@
 //! What disturbs a picture, against closed forms.
 
 use super::*;
-use crate::sim::picture::{Bend, Grains, Motion, Neighbour, Shading, Shadow, Side, Spots, Texture};
+use crate::scenario::image::{
+    Bend, Grains, Motion, Neighbour, Shading, Shadow, Side, Spots, Texture,
+};
 
 /// An edge of the bead of 30 mm [px].
 const LEFT_PX: f64 = 359.5 - 15.0 / PAPER_SCALE;

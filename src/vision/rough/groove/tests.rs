@@ -14,7 +14,7 @@ fn profile(slope: f64, groove_px: f64, groove_grey: f64) -> MeanProfile {
         let ground = 70.0 - slope * place.min(0.0);
         let (near, far) = (share(place), share(place + groove_px));
         let level = ground + (groove_grey - ground) * far + (BEAD - groove_grey) * near;
-        *value = crate::vision::number::narrow(level);
+        *value = crate::numeric::number::narrow(level);
     }
     MeanProfile { grey, inside: (26, 50), outside: (2, 18), on_ground: true, filled: 0.0 }
 }

@@ -1,0 +1,175 @@
+//! Loading a cell with all that it refers to.
+
+mod error;
+pub mod extruder;
+mod range;
+
+pub use error::AssemblyError;
+pub use range::{beyond, steady};
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::calibration::{Calibration, SurfaceMap};
+use crate::cell::Cell;
+use crate::cell::control::WidthLaw;
+use crate::cell::file::{CalibrationSource, ExtruderPart, Purpose};
+use crate::core::units::Mm;
+use crate::extruder::ExtruderSetup;
+use crate::io::calibration_file;
+use crate::io::record::ExtruderFile;
+use crate::sim::cell::Rig;
+use crate::sim::extruder::SimExtruder;
+
+/// The extruder side of a cell that is commanded.
+#[derive(Debug, Clone)]
+pub struct ExtruderSide {
+    /// What the controller knows.
+    pub setup: ExtruderSetup,
+    /// The files that it is made from.
+    pub files: Vec<ExtruderFile>,
+    /// What in them, or about them, an operator should know; nothing that keeps the
+    /// cell from running.
+    pub warnings: Vec<String>,
+}
+
+/// The extruder side of a simulated cell.
+#[derive(Debug)]
+pub struct SimulatedSide {
+    /// What the simulation needs.
+    pub rig: Rig,
+    /// As those of [`ExtruderSide`].
+    pub warnings: Vec<String>,
+}
+
+impl ExtruderSide {
+    /// The file that its strategy is made from, where there is one.
+    pub fn file(&self) -> Option<&ExtruderFile> {
+        extruder::of_strategy(&self.files)
+    }
+}
+
+/// A cell, its calibration, and their texts for the recording.
+#[derive(Debug, Clone)]
+pub struct LoadedCell {
+    /// The file as the command named it.
+    pub path: PathBuf,
+    /// Its text.
+    pub text: String,
+    /// What stands in it.
+    pub cell: Cell,
+    /// What a pixel means in it.
+    pub calibration: Calibration,
+    /// The calibration file's text, where there is one.
+    pub calibration_text: Option<String>,
+}
+
+impl LoadedCell {
+    /// Reads a cell file and its calibration. Everything that is wrong with a
+    /// file is reported at once.
+    pub fn read(path: &Path, purpose: Purpose) -> Result<Self, AssemblyError> {
+        let text = fs::read_to_string(path).map_err(|error| {
+            AssemblyError::unfit(format!("cell file {}: {error}", path.display()))
+        })?;
+        Self::from_text(path, text, purpose)
+    }
+
+    /// The same, for a text that is there already; `path` is what messages
+    /// call it and where relative paths start.
+    pub fn from_text(path: &Path, text: String, purpose: Purpose) -> Result<Self, AssemblyError> {
+        let cell = Cell::parse(path, &text, purpose)?;
+        let (calibration, calibration_text) = match &cell.calibration {
+            CalibrationSource::Scale { mm_per_px, sigma } => {
+                (Calibration::Scale { mm_per_px: *mm_per_px, sigma: *sigma }, None)
+            }
+            CalibrationSource::File(file) => {
+                let calibration = calibration_file::read(file).map_err(|source| {
+                    AssemblyError::Calibration { cell: path.to_owned(), source }
+                })?;
+                let text = fs::read_to_string(file)
+                    .map_err(|source| AssemblyError::Unreadable { file: file.clone(), source })?;
+                (calibration, Some(text))
+            }
+        };
+        let loaded = Self { path: path.to_owned(), text, cell, calibration, calibration_text };
+        loaded.check_sight()?;
+        Ok(loaded)
+    }
+
+    /// Refuses a law by distance whose camera looks at bead that is not laid yet.
+    pub fn check_sight(&self) -> Result<(), AssemblyError> {
+        let Some(run) = &self.cell.run else { return Ok(()) };
+        let half = self.cell.gauge_length(&self.calibration) * 0.5;
+        let offset = run.camera.offset;
+        if offset >= half || !matches!(run.control.law, WidthLaw::Distance(_)) {
+            return Ok(());
+        }
+        Err(AssemblyError::unfit(format!(
+            "{}: camera.offset_mm: found {}, expected {:.1} or more with law = \"distance\": that \
+             is half the length of bead within the gauge, and what is seen must have been laid",
+            self.path.display(),
+            offset.get(),
+            half.get()
+        )))
+    }
+
+    /// The extruder side as the controller has it; none where the cell has
+    /// none. Reads the files that the cell names for it.
+    pub fn extruder(&self) -> Result<Option<ExtruderSide>, AssemblyError> {
+        let Some(run) = &self.cell.run else { return Ok(None) };
+        let Some(part) = &run.extruder else { return Ok(None) };
+        let cell = self.path.display().to_string();
+        let (files, warnings) = extruder::files(part, &cell)?;
+        let setup = extruder::setup(run, part, &cell, &files)?;
+        Ok(Some(ExtruderSide { setup, files, warnings }))
+    }
+
+    /// What answers the extruder's commands in a simulated cell.
+    pub fn plant(&self, part: &ExtruderPart) -> Result<SimExtruder, AssemblyError> {
+        let Some(plant) = &part.plant else {
+            return Err(AssemblyError::unfit(format!(
+                "{}: [extruder_plant]: found nothing, expected what answers the extruder's \
+                 commands in a simulated cell",
+                self.path.display()
+            )));
+        };
+        Ok(SimExtruder::of(plant, self.cell.simulation.seed, part.plant_nominal)?)
+    }
+
+    /// The extruder side as a simulated cell has it; none where the cell has
+    /// none.
+    pub fn simulated_extruder(&self) -> Result<Option<SimulatedSide>, AssemblyError> {
+        let part = self.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
+        let Some(part) = part else { return Ok(None) };
+        let plant = self.plant(part)?;
+        let Some(side) = self.extruder()? else { return Ok(None) };
+        let beyond = beyond(part, &side)?;
+        let warnings = side.warnings.into_iter().chain(beyond).collect();
+        let (demand, nominal_flow) = (part.demand, part.plant_nominal);
+        let rig = Rig { setup: side.setup, demand, plant, nominal_flow };
+        Ok(Some(SimulatedSide { rig, warnings }))
+    }
+
+    /// The map of the measured surface, for a camera that rides as the cell
+    /// says, at the robot's present z.
+    pub fn surface(&self, robot_z: Option<Mm>) -> SurfaceMap {
+        self.cell.surface(&self.calibration, robot_z)
+    }
+
+    /// Calibration and height in words, for the head of a report.
+    pub fn calibration_words(&self) -> String {
+        match &self.cell.calibration {
+            CalibrationSource::Scale { mm_per_px, sigma: Some(sigma) } => {
+                format!("{mm_per_px} ± {sigma} mm/px at the surface")
+            }
+            CalibrationSource::Scale { mm_per_px, sigma: None } => {
+                format!("{mm_per_px} mm/px at the surface")
+            }
+            CalibrationSource::File(file) => {
+                let (height, sigma) = (self.cell.surface_height, self.cell.surface_height_sigma);
+                let sigma = if sigma > Mm::ZERO { format!(" ± {sigma}") } else { String::new() };
+                format!("{}, surface {height}{sigma} above the bed", file.display())
+            }
+        }
+    }
+}

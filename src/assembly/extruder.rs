@@ -1,0 +1,264 @@
+//! The strategy of an extruder from its cell and the file that the cell names:
+//! from the disk for a run, from the recording for a replay.
+
+mod job;
+mod starts;
+
+use std::fs;
+
+use crate::assembly::AssemblyError;
+use crate::cell::extruder::{Extruder, FeedforwardKeys, ModelSource, Strategy};
+use crate::cell::file::{ExtruderPart, RunPart};
+use crate::core::quantity::Unit;
+use crate::core::time::Span;
+use crate::core::units::Rpm;
+use crate::extruder::feedforward::{
+    ExtruderModel, FeedforwardError, FlowForecast, InverseSettings, ScrewSpeed, Tracker,
+};
+use crate::extruder::law::{
+    AdaptiveNozzle, Constant, Foreseen, OperatingPoint, Played, PressureLoop, ScrewFill,
+};
+use crate::extruder::rheology::DragFlow;
+use crate::extruder::{ExtruderSetup, Law};
+use crate::identify::{file as model, profile};
+use crate::io::model_file;
+use crate::io::record::ExtruderFile;
+use crate::io::record::format::{
+    MODEL_ATTACHMENT, PLAN_ATTACHMENT, PROFILE_ATTACHMENT, STARTS_ATTACHMENT,
+};
+use crate::io::recorded::COMMAND;
+use crate::numeric::lti::TransferFunction;
+
+const WITHOUT_FILE: &str = "found a strategy without its file";
+
+/// What the files that an extruder side is made from are called in a recording.
+pub fn attachments(extruder: &Extruder) -> Vec<&'static str> {
+    let starts = extruder.starts.as_ref().map(|_| STARTS_ATTACHMENT);
+    let plan = extruder.plan.as_ref().map(|_| PLAN_ATTACHMENT);
+    [attachment(&extruder.strategy), starts, plan].into_iter().flatten().collect()
+}
+
+/// What the strategy's file is called in a recording; none where it has none.
+fn attachment(strategy: &Strategy) -> Option<&'static str> {
+    match strategy {
+        Strategy::Profile { .. } => Some(PROFILE_ATTACHMENT),
+        Strategy::Feedforward(FeedforwardKeys { model: ModelSource::Screw(_), .. }) => None,
+        Strategy::Feedforward(_) => Some(MODEL_ATTACHMENT),
+        _ => None,
+    }
+}
+
+/// The file of the strategy among those of an extruder side.
+pub fn of_strategy(files: &[ExtruderFile]) -> Option<&ExtruderFile> {
+    files.iter().find(|file| [MODEL_ATTACHMENT, PROFILE_ATTACHMENT].contains(&file.name))
+}
+
+/// Reads the files that the cell names for its extruder. `cell` is what messages call
+/// the cell. Also gives warnings about them.
+pub fn files(
+    part: &ExtruderPart,
+    cell: &str,
+) -> Result<(Vec<ExtruderFile>, Vec<String>), AssemblyError> {
+    let mut warnings = Vec::new();
+    let file = strategy_file(part, cell, &mut warnings)?;
+    let mut files: Vec<ExtruderFile> = file.into_iter().collect();
+    for (name, what, makes, path) in [
+        (STARTS_ATTACHMENT, "starts", "identify --starts", &part.extruder.starts),
+        (PLAN_ATTACHMENT, "plan", "plan", &part.extruder.plan),
+    ] {
+        let Some(path) = path else { continue };
+        let source = format!("{what} {}", path.display());
+        let text = fs::read_to_string(path).map_err(|error| {
+            AssemblyError::unfit(format!("{source}: {error}; `truebead {makes}` makes one"))
+        })?;
+        files.push(ExtruderFile { name, source, text });
+    }
+    Ok((files, warnings))
+}
+
+/// Reads the file that the cell names for its extruder; of a library the model
+/// that fits. `cell` is what messages call the cell; `warnings` takes what is odd about
+/// them.
+pub fn strategy_file(
+    part: &ExtruderPart,
+    cell: &str,
+    warnings: &mut Vec<String>,
+) -> Result<Option<ExtruderFile>, AssemblyError> {
+    let strategy = &part.extruder.strategy;
+    let Some(name) = attachment(strategy) else { return Ok(None) };
+    let (path, what) = match strategy {
+        Strategy::Profile { file } => (file.clone(), "profile"),
+        Strategy::Feedforward(FeedforwardKeys { model: ModelSource::File(file), .. }) => {
+            // Says what to do where there is none.
+            model_file::read(file)?;
+            (file.clone(), "model")
+        }
+        Strategy::Feedforward(FeedforwardKeys {
+            model: ModelSource::Library { folder, wanted },
+            ..
+        }) => {
+            let read = model_file::read_library(folder)?;
+            let broken = read.broken.iter();
+            warnings.extend(broken.map(|broken| format!("this model is not looked at: {broken}")));
+            let found =
+                read.library.find(wanted).map_err(|error| wrong(cell, &error.to_string()))?;
+            tracing::info!(model = found.entry.name, off_c = found.off_c, "model of the cell");
+            (folder.join(&found.entry.name), "model")
+        }
+        _ => return Ok(None),
+    };
+    let source = format!("{what} {}", path.display());
+    let text = fs::read_to_string(&path)
+        .map_err(|error| AssemblyError::unfit(format!("{source}: {error}")))?;
+    Ok(Some(ExtruderFile { name, source, text }))
+}
+
+/// What the extruder side of a controller has to know, with the files that it is
+/// made from. `cell` is what messages call the cell.
+pub fn setup(
+    run: &RunPart,
+    part: &ExtruderPart,
+    cell: &str,
+    files: &[ExtruderFile],
+) -> Result<ExtruderSetup, AssemblyError> {
+    let file = of_strategy(files);
+    let needed = || file.ok_or_else(|| wrong(cell, WITHOUT_FILE));
+    let law = match &part.extruder.strategy {
+        Strategy::Constant { value } => Law::Constant(Constant(*value)),
+        Strategy::Profile { .. } => Law::Profile(played(needed()?, part)?),
+        Strategy::Feedforward(keys) => {
+            let behaviour = behaviour(keys, part, cell, file)?;
+            Law::Feedforward(Box::new(foreseen(keys, run, part, cell, behaviour)?))
+        }
+        Strategy::Pressure(settings) => Law::Pressure(Box::new(PressureLoop::new(**settings))),
+        Strategy::Screw(settings) => Law::Screw(ScrewFill::new(settings)?),
+        Strategy::Adaptive(parts) => Law::Adaptive(AdaptiveNozzle::new(parts.0, parts.1)),
+    };
+    let named = |name| files.iter().find(|file| file.name == name);
+    let plan = named(PLAN_ATTACHMENT).map(|file| job::plan(run, part, file)).transpose()?;
+    let starts = named(STARTS_ATTACHMENT);
+    let timing = starts.map(|file| starts::timing(run, part, file)).transpose()?;
+    if let Some(timing) = &timing {
+        starts::has_room(run, plan.as_deref(), timing, cell)?;
+    }
+    Ok(ExtruderSetup { timing, plan, ..part.extruder.setup(law) })
+}
+
+/// How the extruder of a cell behaves about its operating point, from the command to
+/// mm³/s.
+pub fn behaviour(
+    keys: &FeedforwardKeys,
+    part: &ExtruderPart,
+    cell: &str,
+    file: Option<&ExtruderFile>,
+) -> Result<(TransferFunction, OperatingPoint), AssemblyError> {
+    match (&keys.model, file) {
+        (ModelSource::Screw(screw), _) => carried(*screw),
+        (_, Some(file)) => identified(keys, part, cell, file),
+        (_, None) => Err(wrong(cell, WITHOUT_FILE)),
+    }
+}
+
+fn wrong(cell: &str, what: &str) -> AssemblyError {
+    AssemblyError::unfit(format!("{cell}: [extruder]: {what}"))
+}
+
+/// A screw that carries the same volume with every turn, as a model from rpm to
+/// mm³/s.
+fn carried(screw: DragFlow) -> Result<(TransferFunction, OperatingPoint), AssemblyError> {
+    let one = screw.flow(Rpm::constant(1.0))?;
+    Ok((TransferFunction::gain(one.get())?, OperatingPoint::default()))
+}
+
+/// The model of a file, from the cell's command to mm³/s.
+fn identified(
+    keys: &FeedforwardKeys,
+    part: &ExtruderPart,
+    cell: &str,
+    file: &ExtruderFile,
+) -> Result<(TransferFunction, OperatingPoint), AssemblyError> {
+    let model = model::parse(&file.source, &file.text)?;
+    let (unit, flow) = (part.extruder.drive.unit(), Unit::Mm3PerS);
+    if model.input.unit != unit || model.output.unit != flow {
+        let what = format!(
+            "found a model from {} to {}, expected one from {unit} to {flow}",
+            model.input, model.output
+        );
+        return Err(wrong(cell, &what));
+    }
+    let gain = model.transfer.dc_gain();
+    if gain < 0.0 {
+        let what = format!(
+            "found a model with a gain of {gain:.4}, less flow from more {unit}; expected one \
+             above 0: look at the sign of a column"
+        );
+        return Err(wrong(cell, &what));
+    }
+    if keys.foretold_from == ScrewSpeed::Measured && model.input.name == COMMAND {
+        let what = "found a model whose input was the command, expected one of the screw as it \
+                    was measured (identify --input screw_rpm) for foretold_from = \"encoder\"";
+        return Err(wrong(cell, what));
+    }
+    let (command, flow_mm3_per_s) = model.operating_point;
+    Ok((model.transfer, OperatingPoint { command, flow_mm3_per_s }))
+}
+
+/// The inverse of how the extruder behaves about its operating point.
+fn foreseen(
+    keys: &FeedforwardKeys,
+    run: &RunPart,
+    part: &ExtruderPart,
+    cell: &str,
+    (transfer, about): (TransferFunction, OperatingPoint),
+) -> Result<Foreseen, AssemblyError> {
+    let extruder = &part.extruder;
+    let settings = InverseSettings {
+        time_constant_s: keys.time_constant_s,
+        right_zeros: keys.right_zeros,
+        known_ahead: Span::ZERO,
+        late: keys.late,
+        limits: extruder.limits.about(about.command),
+        period: Span::from_secs(1.0 / extruder.rates.feedforward_hz),
+    };
+    let tracker =
+        Tracker::new(&transfer, &settings).map_err(|error| wrong(cell, &error.to_string()))?;
+    let law = Foreseen::new(tracker, about);
+    let forecast = forecast(transfer, keys.foretold_from, run.robot.rate_hz, settings.period)
+        .map_err(|error| wrong(cell, &error.to_string()))?;
+    Ok(law.foretelling(forecast))
+}
+
+/// What will flow when a setpoint of the robot that is given now has stood for
+/// half of its time, as far as the dead time lets that be known.
+fn forecast(
+    model: TransferFunction,
+    screw: ScrewSpeed,
+    robot_rate_hz: f64,
+    period: Span,
+) -> Result<FlowForecast, FeedforwardError> {
+    let ahead = Span::from_secs(model.dead_time_s().min(0.5 / robot_rate_hz));
+    let model = ExtruderModel { drive: TransferFunction::gain(1.0)?, flow: model };
+    FlowForecast::new(&model, screw, ahead, period)
+}
+
+/// A profile of commands; one of another quantity, or beyond the limits, is
+/// refused before anything moves.
+fn played(file: &ExtruderFile, part: &ExtruderPart) -> Result<Played, AssemblyError> {
+    let wrong = |what: String| AssemblyError::unfit(format!("{}: {what}", file.source));
+    let (profile, quantity) =
+        profile::file::parse(&file.text).map_err(|error| wrong(error.to_string()))?;
+    let unit = part.extruder.drive.unit();
+    if quantity.unit != unit {
+        return Err(wrong(format!(
+            "found {quantity}, expected a quantity in {unit}, the command of [extruder]"
+        )));
+    }
+    let ((low, high), (min, max)) = (profile.range(), part.extruder.limits.range());
+    if low < min || high > max {
+        return Err(wrong(format!(
+            "found commands from {low} to {high} {unit}, expected {min} to {max}, the limits \
+             of [extruder]"
+        )));
+    }
+    Ok(Played::new(profile))
+}

@@ -1,0 +1,51 @@
+//! How a cell times the starts and stops of its beads.
+
+use crate::assembly::AssemblyError;
+use crate::cell::file::{ExtruderPart, RunPart};
+use crate::core::readback::ROBOT_LAG;
+use crate::core::time::Span;
+use crate::core::units::Mm;
+use crate::extruder::start_stop::{Laid, Timing};
+use crate::extruder::trajectory::PlannedJob;
+use crate::identify::start_stop::file;
+use crate::io::record::ExtruderFile;
+
+/// Reads the file of starts and stops for the bead of the cell.
+pub fn timing(
+    run: &RunPart,
+    part: &ExtruderPart,
+    found: &ExtruderFile,
+) -> Result<Timing, AssemblyError> {
+    let read = file::parse(&found.source, &found.text)?;
+    let speed = run.robot.start_speed;
+    let laid = Laid {
+        flow: part.demand.nominal(),
+        speed,
+        // A robot that is told to lay bead cannot be told to stand.
+        least_share: run.limits.min_speed / speed,
+        robot_lag: Span::from_secs(0.5 / run.robot.rate_hz) + ROBOT_LAG,
+    };
+    Timing::new(read.parameters, laid)
+        .map_err(|error| AssemblyError::unfit(format!("{}: {error}", found.source)).into())
+}
+
+/// Refuses beads that would end before their extruder has come to flow and been stopped.
+pub fn has_room(
+    run: &RunPart,
+    plan: Option<&PlannedJob>,
+    timing: &Timing,
+    cell: &str,
+) -> Result<(), AssemblyError> {
+    let planned = plan.into_iter().flat_map(|plan| plan.beads().iter().map(|bead| bead.end()));
+    let Some(shortest) = planned.chain(run.robot.bead_length).reduce(Mm::min) else {
+        return Ok(());
+    };
+    let way = timing.stop().way();
+    if shortest <= way {
+        return Err(AssemblyError::unfit(format!(
+            "{cell}: robot.bead_length_mm or a planned bead: found {shortest}, expected more than \
+             {way}, which is laid after the pump was told to stop: leave extruder.starts out"
+        )));
+    }
+    Ok(())
+}

@@ -1,0 +1,121 @@
+//! Whether a cell uses its model where it was identified, and its profile as
+//! fast as its limits allow.
+
+use super::{AssemblyError, ExtruderSide};
+use crate::cell::extruder::{ModelSource, Strategy};
+use crate::cell::file::ExtruderPart;
+use crate::core::units::MPa;
+use crate::extruder::Law;
+use crate::extruder::law::Played;
+use crate::identify::file as model;
+use crate::identify::profile::Point;
+
+/// What a strategy comes to where it gives the wanted flow for long.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Steady {
+    /// In the unit of the command.
+    pub command: f64,
+    /// Pressure at the nozzle, for a strategy that holds it.
+    pub pressure: Option<MPa>,
+}
+
+/// The steady command of a strategy; none where it has none of its own.
+pub fn steady(part: &ExtruderPart, side: &ExtruderSide) -> Result<Option<Steady>, AssemblyError> {
+    let flow = part.demand.nominal();
+    match &part.extruder.strategy {
+        Strategy::Feedforward(keys) => {
+            let command = match (&keys.model, side.file()) {
+                (ModelSource::Screw(screw), _) => screw.speed(flow)?.get(),
+                (_, Some(file)) => {
+                    let model = model::parse(&file.source, &file.text)?;
+                    let (input, output) = model.operating_point;
+                    input + (flow.get() - output) / model.transfer.dc_gain()
+                }
+                (_, None) => return Ok(None),
+            };
+            Ok(Some(Steady { command, pressure: None }))
+        }
+        Strategy::Pressure(settings) => {
+            let pressure = settings.nozzle.pressure(flow)?;
+            let command = pressure.get() / settings.model.gain();
+            Ok(Some(Steady { command, pressure: Some(pressure) }))
+        }
+        _ => Ok(None),
+    }
+}
+
+/// What to say where the strategy asks for what the extruder or its model does
+/// not give; none where all is well.
+pub fn beyond(part: &ExtruderPart, side: &ExtruderSide) -> Result<Option<String>, AssemblyError> {
+    match &side.setup.law {
+        Law::Profile(played) => Ok(too_fast(part, side, played)),
+        _ => match steady(part, side)? {
+            Some(Steady { pressure: Some(pressure), .. })
+                if part.extruder.max_pressure.is_some_and(|most| pressure > most) =>
+            {
+                Ok(Some(format!(
+                    "[extruder]: {:.1} mm³/s take {:.3} MPa at the nozzle, above max_pressure_mpa; \
+                     the pump will be stopped",
+                    part.demand.nominal().get(),
+                    pressure.get()
+                )))
+            }
+            Some(steady) => beyond_limits_or_model(part, side, steady.command),
+            None => Ok(None),
+        },
+    }
+}
+
+/// Where a steady command lies outside the limits, or outside the inputs that
+/// its model was identified with.
+fn beyond_limits_or_model(
+    part: &ExtruderPart,
+    side: &ExtruderSide,
+    command: f64,
+) -> Result<Option<String>, AssemblyError> {
+    let (flow, unit) = (part.demand.nominal().get(), part.extruder.drive.unit_word());
+    let source = side.file().map_or("[extruder]", |file| file.source.as_str());
+    let (min, max) = part.extruder.limits.range();
+    if !(min..=max).contains(&command) {
+        return Ok(Some(format!(
+            "{source}: {flow:.1} mm³/s take {command:.4} {unit}, but [extruder] allows {min} to \
+             {max} {unit}; the bead will not have its flow"
+        )));
+    }
+    let Some(file) = side.file() else { return Ok(None) };
+    let (low, high) = model::parse(&file.source, &file.text)?.input_range;
+    Ok((!(low..=high).contains(&command)).then(|| {
+        format!(
+            "{source}: {flow:.1} mm³/s take {command:.4} {unit}, but it was identified from {low} \
+             to {high} {unit}; what it says there is a guess"
+        )
+    }))
+}
+
+/// Two times that differ by less are the same \[s\].
+const SAME_S: f64 = 1e-9;
+
+/// Where a profile goes on before the fastest change has brought the command
+/// to its value. Its first value is no change.
+fn too_fast(part: &ExtruderPart, side: &ExtruderSide, played: &Played) -> Option<String> {
+    let profile = played.profile();
+    let rate = part.extruder.limits.rate_per_s();
+    let ends = profile.points().iter().skip(2).map(|point| point.from_s);
+    let steps = profile.points().windows(2).zip(ends.chain([profile.end_s()]));
+    let (mut missed, mut first) = (0_usize, None);
+    for (pair, until_s) in steps {
+        let [before, Point { from_s, value }] = pair else { continue };
+        let takes_s = (value - before.value).abs() / rate;
+        if takes_s > until_s - from_s + SAME_S {
+            missed += 1;
+            first.get_or_insert((*from_s, (value - before.value).abs(), takes_s, until_s - from_s));
+        }
+    }
+    let (from_s, by, takes_s, has_s) = first?;
+    let (unit, source) = (part.extruder.drive.unit_word(), side.file()?.source.as_str());
+    Some(format!(
+        "{source}: {missed} of its changes are not made to their end: that of {by:.4} {unit} at \
+         {from_s:.2} s takes {takes_s:.3} s at max_{unit}_per_s = {rate}, and there are {has_s:.3} s \
+         until the next one or the end"
+    ))
+}

@@ -1,0 +1,127 @@
+//! Which lens, and whether the board is bent: what foretells pictures best that took
+//! no part in the fit. A residual cannot decide that: it falls with every number
+//! that is fitted.
+
+use nalgebra::{DVector, SMatrix, SVector};
+
+use super::bundle;
+use super::bundle::Fit;
+use super::equations::{Factor, Free, SHARED};
+use super::lens::Lens;
+use super::pull::Pull;
+use super::solve::{Views, only};
+
+/// Share of the smallest held-out error by which a lens may foretell worse and be
+/// taken for as good. Of those that are as good the one with the most coefficients is
+/// chosen, because a coefficient that is left out counts as known. The rational one
+/// must foretell better by as much: where its numerator and its denominator nearly
+/// cancel, its numbers are anywhere.
+const AS_GOOD: f64 = 0.005;
+/// Standard deviations from which on a bend of the board is believed.
+const BELIEVED_BEND: f64 = 4.0;
+
+/// What one choice gives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trial {
+    /// What was fitted.
+    pub free: Free,
+    /// Root mean square of all reprojection errors \[px\].
+    pub rms_px: f64,
+    /// The same of pictures that took no part in fitting the camera, each left out
+    /// once \[px\]; `None` where the others do not settle the camera.
+    pub held_out_px: Option<f64>,
+    /// Whether the lens turns over within the picture: then it is taken only if all do.
+    pub folds: bool,
+}
+
+/// Fits on a flat board with one lens after the other, each begun where the one before
+/// it ended, up to one with the most coefficients; those that lead nowhere left out.
+fn fits(views: &Views, most: Lens) -> Vec<(Fit, Trial)> {
+    let mut fits: Vec<(Fit, Trial)> = Vec::new();
+    for lens in Lens::ALL.into_iter().filter(|lens| *lens <= most) {
+        let start = fits
+            .last()
+            .map_or_else(|| views.start.clone(), |(fit, _)| (fit.model, fit.places.clone()));
+        let free = Free { lens: Some(lens), bend: false };
+        if let Some(fit) = bundle::fit(start, free, &views.boards) {
+            let trial = trial(views, &fit, free);
+            fits.push((fit, trial));
+        }
+    }
+    fits
+}
+
+/// The best choice and all that was tried. `None` where no lens leads to a camera.
+pub(super) fn best(views: &Views) -> Option<(Fit, Free, Vec<Trial>)> {
+    let mut fits = fits(views, Lens::Rational);
+    let chosen = chosen(&fits)?;
+    let mut trials: Vec<Trial> = fits.iter().map(|(_, trial)| *trial).collect();
+    let (fit, chosen) = fits.swap_remove(chosen);
+    let free = Free { bend: true, ..chosen.free };
+    let bent = bundle::fit((fit.model, fit.places.clone()), free, &views.boards)
+        .map(|fit| (trial(views, &fit, free), fit));
+    if let Some((trial, bent)) = bent {
+        trials.push(trial);
+        let foretells = trial.held_out_px.zip(chosen.held_out_px).is_some_and(|(b, f)| b < f);
+        let is_sound = chosen.folds || !trial.folds;
+        if foretells && is_sound && is_bent(views, &bent, free) {
+            return Some((bent, free, trials));
+        }
+    }
+    Some((fit, chosen.free, trials))
+}
+
+/// Which of the fits on a flat board is taken; where nothing can be held out the one
+/// with the fewest coefficients. `None` without a fit.
+fn chosen(fits: &[(Fit, Trial)]) -> Option<usize> {
+    let is_rational = |trial: &Trial| trial.free.lens == Some(Lens::Rational);
+    let all_fold = fits.iter().all(|(_, trial)| trial.folds);
+    let held_out =
+        |(_, trial): &(Fit, Trial)| trial.held_out_px.filter(|_| all_fold || !trial.folds);
+    let simpler = fits.iter().filter(|(_, trial)| !is_rational(trial));
+    let least = simpler.filter_map(held_out).fold(f64::INFINITY, f64::min);
+    let is_as_good = |fit: &(Fit, Trial)| {
+        let most = if is_rational(&fit.1) { 1.0 - AS_GOOD } else { 1.0 + AS_GOOD };
+        held_out(fit).is_some_and(|px| px <= most * least)
+    };
+    let simplest = || fits.iter().position(|(_, trial)| all_fold || !trial.folds);
+    fits.iter().rposition(is_as_good).or_else(simplest)
+}
+
+/// A fit with a lens that is given, by way of the simpler ones.
+pub(super) fn up_to(views: &Views, lens: Lens) -> Option<(Fit, Trial)> {
+    fits(views, lens).pop().filter(|(_, trial)| trial.free.lens == Some(lens))
+}
+
+fn is_bent(views: &Views, fit: &Fit, free: Free) -> bool {
+    let variance = views.noise_variance_px2(fit, free);
+    let Some(spreads) = views.spreads(fit, free) else { return false };
+    let sigma = |side: usize| spreads[SHARED - 2 + side] * variance.sqrt();
+    (0..2).any(|side| fit.model.bend_mm[side].abs() > BELIEVED_BEND * sigma(side))
+}
+
+fn trial(views: &Views, fit: &Fit, free: Free) -> Trial {
+    let rms_px = views.rms_px(fit.squares_px2);
+    let folds = fit.model.camera.fold(views.size).is_some();
+    Trial { free, rms_px, held_out_px: held_out_px(views, fit, free), folds }
+}
+
+/// Root mean square error of each picture with the camera that the others give and
+/// its own pose fitted \[px\].
+///
+/// To first order in what one picture moves the camera: at the best fit the others
+/// together pull as one picture pulls against them, so that without it the camera
+/// goes by ds = −(S − Sᵥ)⁻¹gᵥ, with S all pictures' equations, poses eliminated, and
+/// Sᵥ and gᵥ its own; of its errors that leaves |r|² + 2 gᵥᵀ(S − Sᵥ)⁻¹gᵥ + dsᵀSᵥds.
+fn held_out_px(views: &Views, fit: &Fit, free: Free) -> Option<f64> {
+    let each = Pull::all(views, fit, free)?;
+    let all: SMatrix<f64, SHARED, SHARED> = each.iter().map(|one| one.left).sum();
+    let mut squares = 0.0;
+    for Pull { left, score, squares_px2 } in each {
+        let rest = Factor::of_shared(&only(all - left, free))?;
+        let moved = rest.solve(&DVector::from_column_slice(score.as_slice()));
+        let moved = SVector::<f64, SHARED>::from_fn(|row, _| moved[row]);
+        squares += squares_px2 + 2.0 * score.dot(&moved) + (moved.transpose() * left * moved)[0];
+    }
+    Some(views.rms_px(squares))
+}

@@ -1,0 +1,438 @@
+//! How far a calibration may be off because the corners that it was found from
+//! are: the covariance of the fit, and what it leaves in a width.
+//!
+//! The fit is one of least squares, over the numbers of the camera that are free,
+//! the bend of the board where it was fitted, and the pose of the board in each
+//! picture. To first order in the noise of the corners the covariance is the inverse
+//! of its normal equations (Triggs et al. 2000, *Bundle adjustment – a modern
+//! synthesis*, sections 6.1 and 8.1).
+
+use nalgebra::{DMatrix, DVector, Point3, SMatrix, SVector};
+
+use super::board::Board;
+use super::camera::NUMBERS;
+use super::equations::{Corner, Elimination, Equations, Factor, Free, Model, POSE, Place, SHARED};
+use super::plane::{OnBed, bed_from_board};
+use super::scale;
+use super::solve::{Solution, only};
+use super::uncertainty::{Joint, UNCERTAIN, Uncertainty};
+use super::{Calibration, SurfaceMap};
+use crate::core::geometry::{ImagePoint, Pose};
+use crate::core::units::Mm;
+
+/// Step of the central differences, as a share of a focal length, as an angle
+/// \[rad\] or as a share of the board's distance: small against the bend of the model
+/// and large against rounding.
+const STEP: f64 = 1e-4;
+
+/// What the noise of the corners leaves open in a calibration.
+#[derive(Debug, Clone)]
+pub struct Covariance {
+    model: Model,
+    free: Free,
+    image_size_px: [u32; 2],
+    seen_px: [ImagePoint; 2],
+    bed: Place,
+    on_bed: Vec<Vec<Corner>>,
+    thickness: Mm,
+    noise_variance_px2: f64,
+    /// What all pictures say of the shared numbers, their boards' poses being free.
+    left: SMatrix<f64, SHARED, SHARED>,
+    of_shared: Factor,
+    of_bed: Elimination,
+}
+
+/// A number that is read off a surface, and how it answers to the calibration.
+#[derive(Debug, Clone)]
+pub struct Reading {
+    /// The number itself.
+    pub value: f64,
+    /// With the shared numbers, the bed going where they take it.
+    slope: DVector<f64>,
+    /// Variance that the corners of the boards on the bed add, in units of their
+    /// noise's.
+    of_bed: f64,
+}
+
+impl Covariance {
+    /// Of a solution and the boards that fixed the bed plane, and the height of their
+    /// faces above the bed. Their pictures may be among the solution's or taken
+    /// later; in both cases their poses were fitted to their own corners with the
+    /// solution's camera. `None` where the pictures do not settle the camera.
+    pub fn of(board: &Board, solution: &Solution, on_bed: &OnBed, thickness: Mm) -> Option<Self> {
+        let (model, free) = (solution.model, solution.free);
+        let mut left = SMatrix::<f64, SHARED, SHARED>::zeros();
+        for (number, view) in solution.views.iter().enumerate() {
+            let corners = solution.corners(board, number);
+            left += eliminate(&model, free, &Place::of_one(view.pose), &[corners])?.left;
+        }
+        let noise_variance_px2 = solution.noise_px.powi(2) * solution.design_effect;
+        let left = only(left, free);
+        Some(Self {
+            model,
+            free,
+            image_size_px: solution.image_size_px,
+            seen_px: solution.seen_px()?,
+            bed: on_bed.place.clone(),
+            on_bed: on_bed.boards.clone(),
+            thickness,
+            noise_variance_px2: Some(noise_variance_px2).filter(|noise| noise.is_finite())?,
+            of_shared: Factor::of_shared(&left)?,
+            left,
+            of_bed: eliminate(&model, free, &on_bed.place, &on_bed.boards)?,
+        })
+    }
+
+    /// The same if there were another picture of a board, with as much noise.
+    /// `None` where the board would not be in front of the camera.
+    pub fn with_another(&self, pose: &Pose, corners: &[Corner]) -> Option<Self> {
+        let place = Place::of_one(*pose);
+        let more = eliminate(&self.model, self.free, &place, &[corners.to_vec()])?;
+        let left = self.left + only(more.left, self.free);
+        Some(Self { of_shared: Factor::of_shared(&left)?, left, ..self.clone() })
+    }
+
+    /// The same if there were another board on the bed, whose picture takes part in
+    /// both fits: where it lies on the plane of the first. `None` where it would not be
+    /// in front of the camera.
+    pub fn with_another_on_bed(&self, lies: [f64; 3], corners: &[Corner]) -> Option<Self> {
+        let mut bed = self.bed.clone();
+        bed.others.push(lies);
+        let mut on_bed = self.on_bed.clone();
+        on_bed.push(corners.to_vec());
+        let of_bed = eliminate(&self.model, self.free, &bed, &on_bed)?;
+        let pose = bed.of_board(bed.others.len());
+        Some(Self { bed, on_bed, of_bed, ..self.with_another(&pose, corners)? })
+    }
+
+    /// Where a further board would lie that is on the bed.
+    pub fn on_bed(&self, lies: [f64; 3]) -> Pose {
+        let others = vec![lies];
+        Place { pose: self.bed.pose, others }.of_board(1)
+    }
+
+    /// Size of the pictures \[px\].
+    pub fn image_size_px(&self) -> [u32; 2] {
+        self.image_size_px
+    }
+
+    /// First and last column and row between which boards were seen \[px\].
+    pub fn seen_px(&self) -> [ImagePoint; 2] {
+        self.seen_px
+    }
+
+    /// Height of the boards' faces above the bed.
+    pub fn thickness(&self) -> Mm {
+        self.thickness
+    }
+
+    /// How far the camera is above the bed \[mm\].
+    pub fn camera_height_mm(&self) -> f64 {
+        bed_from_board(&self.bed.pose, self.thickness).apply_inverse(Point3::origin()).z
+    }
+
+    /// The camera and the bend of the board.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Distance of two points of a surface, seen at these pixels, and its
+    /// standard deviation \[mm\]. `None` off the surface.
+    pub fn width_mm(&self, ends: [ImagePoint; 2], surface_height: Mm) -> Option<(f64, f64)> {
+        let reading = self.width(ends, surface_height)?;
+        Some((reading.value, self.sigma(&reading)))
+    }
+
+    /// The same before the noise is known.
+    pub fn width(&self, ends: [ImagePoint; 2], surface_height: Mm) -> Option<Reading> {
+        let width = |map: &SurfaceMap| Some((map.to_mm(ends[1])? - map.to_mm(ends[0])?).norm());
+        self.read(surface_height, width)
+    }
+
+    /// The number of [`scale::single_scale`] and its standard deviation
+    /// \[mm/px\]. `None` where the middle of the picture does not see the
+    /// surface.
+    pub fn mm_per_px(&self, surface_height: Mm) -> Option<(f64, f64)> {
+        let reading =
+            self.read(surface_height, |map| scale::in_the_middle(map, self.image_size_px))?;
+        Some((reading.value, self.sigma(&reading)))
+    }
+
+    /// Standard deviation of a number that was read.
+    pub fn sigma(&self, reading: &Reading) -> f64 {
+        let whitened = self.of_shared.whiten(&as_matrix(&reading.slope));
+        (self.noise_variance_px2 * (whitened.norm_squared() + reading.of_bed)).sqrt()
+    }
+
+    /// What is left open in camera and bed plane together.
+    pub fn uncertainty(&self) -> Uncertainty {
+        self.joint(1.0)
+    }
+
+    /// The same without what the noise of the bed's own corners adds: two cameras that see
+    /// the same board share that.
+    pub fn uncertainty_of_camera(&self) -> Uncertainty {
+        self.joint(0.0)
+    }
+
+    /// With so many times the variance of the corners of the boards on the bed.
+    ///
+    /// The bed's pose answers to the shared numbers s as b = −V⁻¹W·s, with V its own
+    /// equations and W those of both; its own corners add V⁻¹.
+    fn joint(&self, own: f64) -> Uncertainty {
+        let numbers = self.bed.numbers();
+        let own_root = self.of_bed.place.whiten(&DMatrix::identity(numbers, numbers));
+        let follows = (own_root.transpose() * &self.of_bed.follows).rows(0, POSE).into_owned();
+        let mut answers = DMatrix::zeros(UNCERTAIN, SHARED);
+        answers.view_mut((0, 0), (NUMBERS, NUMBERS)).fill_with_identity();
+        answers.rows_mut(NUMBERS, POSE).copy_from(&-follows);
+        let of_shared = self.of_shared.whiten(&answers.transpose());
+        let mut joint = of_shared.transpose() * of_shared;
+        let pose = own_root.columns(0, POSE);
+        let mut of_bed = joint.view_mut((NUMBERS, NUMBERS), (POSE, POSE));
+        of_bed += pose.transpose() * pose * own;
+        joint *= self.noise_variance_px2;
+        // From the board's origin to the bed's, about which the bed turns.
+        let face = &self.bed.pose;
+        let bed = bed_from_board(face, self.thickness);
+        let arm = bed.translation_mm() - face.translation_mm();
+        let mut moved = DMatrix::identity(UNCERTAIN, UNCERTAIN);
+        moved.view_mut((NUMBERS + 3, NUMBERS), (3, 3)).copy_from(&-arm.cross_matrix());
+        let joint = &moved * joint * moved.transpose();
+        Uncertainty::of(&Joint::from_fn(|row, column| joint[(row, column)]))
+    }
+
+    /// The map of a surface.
+    pub fn surface(&self, surface_height: Mm) -> SurfaceMap {
+        self.map(&self.model, &self.bed, surface_height)
+    }
+
+    /// What is read off the map of a surface, and its slopes.
+    ///
+    /// A camera that is off takes the bed along, because that was fitted with it, and
+    /// makes up for a part of the error: the slope with the shared numbers contains
+    /// how the bed follows them.
+    fn read(
+        &self,
+        surface_height: Mm,
+        read: impl Fn(&SurfaceMap) -> Option<f64>,
+    ) -> Option<Reading> {
+        let with = |model: &Model, bed: &Place| read(&self.map(model, bed, surface_height));
+        let mut of_shared = DVector::zeros(SHARED);
+        for number in (0..SHARED).filter(|&number| self.free.has(number)) {
+            // Focal lengths and centre in pixels, all else in units of about one.
+            let step =
+                if number < 4 { STEP * self.model.camera.focal_px[number % 2] } else { STEP };
+            let mut by = SVector::<f64, SHARED>::zeros();
+            by[number] = step;
+            let up = with(&self.model.stepped(&by), &self.bed)?;
+            let down = with(&self.model.stepped(&-by), &self.bed)?;
+            of_shared[number] = (up - down) / (2.0 * step);
+        }
+        let mut of_bed = DVector::zeros(self.bed.numbers());
+        let distance = self.bed.pose.translation_mm().norm();
+        for number in 0..POSE {
+            let step = if number < 3 { STEP } else { STEP * distance };
+            let mut by = DVector::zeros(self.bed.numbers());
+            by[number] = step;
+            let up = with(&self.model, &self.bed.stepped(&by))?;
+            let down = with(&self.model, &self.bed.stepped(&-by))?;
+            of_bed[number] = (up - down) / (2.0 * step);
+        }
+        let alone = self.of_bed.place.whiten(&as_matrix(&of_bed));
+        let slope = of_shared - self.of_bed.follows.transpose() * alone.column(0);
+        let value = with(&self.model, &self.bed)?;
+        Some(Reading { value, slope, of_bed: alone.norm_squared() })
+    }
+
+    fn map(&self, model: &Model, bed: &Place, surface_height: Mm) -> SurfaceMap {
+        let calibration = Calibration::Full {
+            image_size_px: self.image_size_px,
+            camera: model.camera,
+            bed: bed_from_board(&bed.pose, self.thickness),
+            robot_z: Mm::ZERO,
+            quality: None,
+        };
+        calibration.surface(surface_height, None)
+    }
+}
+
+fn as_matrix(vector: &DVector<f64>) -> DMatrix<f64> {
+    DMatrix::from_column_slice(vector.len(), 1, vector.as_slice())
+}
+
+fn eliminate(
+    model: &Model,
+    free: Free,
+    place: &Place,
+    boards: &[Vec<Corner>],
+) -> Option<Elimination> {
+    Elimination::of(&Equations::of(model, free, place, boards)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::calibration::covariance::*;
+    use nalgebra::Vector3;
+
+    use crate::calibration::Quality;
+    use crate::calibration::lens::Lens;
+    use crate::calibration::share;
+    use crate::calibration::solve;
+    use crate::calibration::synthetic;
+    use crate::calibration::synthetic::{SIZE, TRUTH, board, poses};
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, Normal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+    use rayon::prelude::*;
+
+    const NOISE_PX: f64 = 0.1;
+    const THICKNESS: Mm = Mm::constant(4.0);
+    const SEEDS: u64 = 400;
+
+    fn later() -> Pose {
+        Pose::new(Vector3::new(0.1, -0.2, 0.3), Vector3::new(-70.0, -60.0, 400.0))
+    }
+
+    /// The pictures of a calibration, and a bed from one of them, from one that was
+    /// taken later, and from that one with two more beside it.
+    fn solved(seed: u64) -> (Solution, [OnBed; 3]) {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let noise = Normal::new(0.0, NOISE_PX).unwrap();
+        let mut off = || noise.sample(&mut random);
+        let sightings: Vec<_> =
+            poses().iter().map(|pose| synthetic::sighting("", pose, &mut off)).collect();
+        let solution = solve::solve_with(&board(), &sightings, Lens::Five).unwrap();
+        let several = Place { pose: later(), others: vec![[10.0, 14.0, 0.3], [-20.0, 5.0, -0.4]] };
+        let mut seen = |i| board().place(&synthetic::seen(&several.of_board(i), &mut off));
+        let (first, second, third) = (seen(0), seen(1), seen(2));
+        let own = board().place(&sightings[3].corners);
+        let beds = [vec![own], vec![first.clone()], vec![first, second, third]]
+            .map(|boards| OnBed::fit(&solution.model, boards).unwrap());
+        (solution, beds)
+    }
+
+    fn covariance(solution: &Solution, on_bed: &OnBed) -> Covariance {
+        Covariance::of(&board(), solution, on_bed, THICKNESS).unwrap()
+    }
+
+    /// Beads here and there, and the height of their surface.
+    fn beads() -> [([ImagePoint; 2], Mm); 3] {
+        let at = ImagePoint::new;
+        [
+            ([at(240.0, 270.0), at(480.0, 270.0)], Mm::ZERO),
+            ([at(20.0, 40.0), at(200.0, 60.0)], Mm::ZERO),
+            ([at(600.0, 200.0), at(590.0, 500.0)], Mm::constant(20.0)),
+        ]
+    }
+
+    #[test]
+    #[expect(clippy::cast_precision_loss, reason = "some seeds")]
+    fn widths_scatter_over_many_calibrations_as_each_of_them_foretells() {
+        let runs: Vec<[Covariance; 3]> = (0..SEEDS)
+            .into_par_iter()
+            .map(|seed| {
+                let (solution, beds) = solved(seed);
+                beds.map(|bed| covariance(&solution, &bed))
+            })
+            .collect();
+        for which in 0..3 {
+            for (ends, height) in beads() {
+                let widths = runs.iter().map(|run| run[which].width_mm(ends, height).unwrap());
+                let (widths, sigmas): (Vec<f64>, Vec<f64>) = widths.unzip();
+                let mean = widths.iter().sum::<f64>() / SEEDS as f64;
+                let squares = widths.iter().map(|width| (width - mean).powi(2)).sum::<f64>();
+                let scatter = (squares / (SEEDS - 1) as f64).sqrt();
+                let foretold = (sigmas.iter().map(|s| s * s).sum::<f64>() / SEEDS as f64).sqrt();
+                let ratio = scatter / foretold;
+                assert!((0.9..1.1).contains(&ratio), "bed {which}, {ends:?}: {ratio}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_joint_covariance_says_what_each_width_does() {
+        let (solution, beds) = solved(6);
+        for bed in &beds {
+            let covariance = covariance(&solution, bed);
+            let quality = Quality {
+                reprojection_rms_px: solution.rms_px,
+                width_sigma_share: None,
+                seen_px: None,
+                heights_mm: None,
+                uncertainty: Some(covariance.uncertainty()),
+            };
+            let calibration = Calibration::Full {
+                image_size_px: SIZE,
+                camera: *solution.camera(),
+                bed: bed.bed(THICKNESS),
+                robot_z: Mm::ZERO,
+                quality: Some(quality),
+            };
+            for (ends, height) in beads() {
+                let (width, sigma) = covariance.width_mm(ends, height).unwrap();
+                let share = calibration.surface(height, None).width_sigma_share_of(ends).unwrap();
+                assert!((share * width / sigma - 1.0).abs() < 1e-4, "{share} {sigma} {width}");
+            }
+        }
+    }
+
+    #[test]
+    fn three_boards_on_the_bed_tell_its_plane_better_than_one() {
+        let (solution, [_, one, three]) = solved(5);
+        let [one, three] = [one, three].map(|bed| covariance(&solution, &bed));
+        let (ends, height) = beads()[2];
+        let [one, three] = [one, three].map(|c| c.width_mm(ends, height).unwrap().1);
+        assert!(three < one, "{three} {one}");
+    }
+
+    #[test]
+    fn the_share_is_no_smaller_than_that_of_a_bead_in_the_middle() {
+        let (solution, [_, later, _]) = solved(2);
+        let covariance = covariance(&solution, &later);
+        let share = share::where_seen(&covariance).unwrap();
+        let (ends, height) = beads()[0];
+        let (width, sigma) = covariance.width_mm(ends, height).unwrap();
+        assert!(share >= sigma / width && share < 0.002, "{share}");
+        let (mm_per_px, sigma) = covariance.mm_per_px(THICKNESS).unwrap();
+        let calibration = Calibration::Full {
+            image_size_px: SIZE,
+            camera: *solution.camera(),
+            bed: later.bed(THICKNESS),
+            robot_z: Mm::ZERO,
+            quality: None,
+        };
+        let scale = scale::single_scale(&calibration, THICKNESS).unwrap();
+        assert_eq!(mm_per_px, scale.mm_per_px);
+        assert!(sigma > 0.0 && sigma / mm_per_px < share);
+    }
+
+    #[test]
+    fn more_noise_leaves_more_and_boards_all_alike_do_not_settle_the_camera() {
+        let (solution, [_, later, _]) = solved(3);
+        let share = share::where_seen(&covariance(&solution, &later)).unwrap();
+        let noisy = Solution { noise_px: 2.0 * solution.noise_px, ..solution.clone() };
+        let doubled = share::where_seen(&covariance(&noisy, &later)).unwrap();
+        assert!((doubled / share - 2.0).abs() < 1e-9);
+        let straight = Pose::new(Vector3::zeros(), Vector3::new(-80.0, -50.0, 420.0));
+        let mut alike = solution;
+        alike.model.camera = TRUTH;
+        for view in &mut alike.views {
+            view.pose = straight;
+        }
+        assert!(Covariance::of(&board(), &alike, &later, THICKNESS).is_none());
+    }
+
+    #[test]
+    fn another_picture_leaves_less_open() {
+        let (solution, [_, later, _]) = solved(4);
+        let covariance = covariance(&solution, &later);
+        let pose = poses()[7];
+        let corners = board().place(&synthetic::seen(&pose, || 0.0));
+        let more = covariance.with_another(&pose, &corners).unwrap();
+        for (ends, height) in beads() {
+            let [with, without] = [&more, &covariance].map(|c| c.width_mm(ends, height).unwrap().1);
+            assert!(with < without && with > 0.5 * without, "{with} {without}");
+        }
+    }
+}

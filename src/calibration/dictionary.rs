@@ -1,0 +1,133 @@
+//! Dictionaries of `ArUco` markers: which cells of a marker are white. The codes are
+//! those that OpenCV gives out under the same names.
+
+use std::sync::OnceLock;
+
+/// Markers of one size: so many cells along each side, and a black border of one cell
+/// around them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dictionary {
+    /// 4x4 cells.
+    Four,
+    /// 5x5 cells.
+    Five,
+    /// 6x6 cells.
+    Six,
+    /// 7x7 cells.
+    Seven,
+}
+
+/// Codes as hexadecimal numbers, row by row from the upper left cell, 1 for white.
+const TEXTS: [&str; 4] = [
+    include_str!("dictionary/4x4.txt"),
+    include_str!("dictionary/5x5.txt"),
+    include_str!("dictionary/6x6.txt"),
+    include_str!("dictionary/7x7.txt"),
+];
+
+impl Dictionary {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Four, Self::Five, Self::Six, Self::Seven];
+    /// Markers of each.
+    pub const MARKERS: usize = 1000;
+
+    /// The one that is meant by `4x4`, or by OpenCV's `DICT_4X4_50` and its kin: these
+    /// are the first markers of the same list.
+    pub fn named(text: &str) -> Option<Self> {
+        let lower = text.trim().to_lowercase();
+        let name = lower.strip_prefix("dict_").unwrap_or(&lower);
+        let (cells, count) = name.split_once('_').map_or((name, None), |(a, b)| (a, Some(b)));
+        let is_known = count.is_none_or(|count| ["50", "100", "250", "1000"].contains(&count));
+        Self::ALL.into_iter().find(|known| known.name() == cells && is_known)
+    }
+
+    /// As it is told on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Four => "4x4",
+            Self::Five => "5x5",
+            Self::Six => "6x6",
+            Self::Seven => "7x7",
+        }
+    }
+
+    /// Cells of the code along each side.
+    pub fn side(self) -> usize {
+        4 + self.number()
+    }
+
+    fn number(self) -> usize {
+        match self {
+            Self::Four => 0,
+            Self::Five => 1,
+            Self::Six => 2,
+            Self::Seven => 3,
+        }
+    }
+
+    /// Cells that may be misread: so few that what is no marker hardly ever passes for
+    /// one.
+    pub fn forgiven(self) -> u32 {
+        match self {
+            Self::Four => 0,
+            Self::Five => 1,
+            Self::Six => 2,
+            Self::Seven => 3,
+        }
+    }
+
+    /// The codes, by their markers' numbers; the upper left cell is the highest bit.
+    pub fn codes(self) -> &'static [u64] {
+        static CODES: [OnceLock<Vec<u64>>; 4] = [const { OnceLock::new() }; 4];
+        CODES[self.number()].get_or_init(|| {
+            let words = TEXTS[self.number()].split_whitespace();
+            words.map(|word| u64::from_str_radix(word, 16).unwrap_or_default()).collect()
+        })
+    }
+
+    /// Whether a cell of a marker's code is white.
+    pub fn is_white(self, marker: usize, column: usize, row: usize) -> bool {
+        let cell = row * self.side() + column;
+        let last = self.side() * self.side() - 1;
+        self.codes().get(marker).is_some_and(|code| (code >> (last - cell)) & 1 == 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::calibration::dictionary::*;
+
+    #[test]
+    fn all_codes_are_there_and_no_two_are_alike() {
+        for dictionary in Dictionary::ALL {
+            let mut codes = dictionary.codes().to_vec();
+            let cells = dictionary.side() * dictionary.side();
+            assert!(codes.iter().all(|&code| code > 0 && code >> cells == 0));
+            codes.sort_unstable();
+            codes.dedup();
+            assert_eq!(codes.len(), Dictionary::MARKERS, "{}", dictionary.name());
+        }
+    }
+
+    #[test]
+    fn the_first_marker_of_4x4_is_the_known_one() {
+        let rows: Vec<String> = (0..4)
+            .map(|row| {
+                let cell =
+                    |column| if Dictionary::Four.is_white(0, column, row) { '1' } else { '0' };
+                (0..4).map(cell).collect()
+            })
+            .collect();
+        assert_eq!(rows, ["1011", "0101", "0011", "0010"]);
+    }
+
+    #[test]
+    fn names_are_told_in_both_ways() {
+        assert_eq!(Dictionary::named("4x4"), Some(Dictionary::Four));
+        assert_eq!(Dictionary::named("DICT_6X6_250"), Some(Dictionary::Six));
+        assert_eq!(Dictionary::named("5X5_1000"), Some(Dictionary::Five));
+        for unknown in ["8x8", "4x4_60", "aruco", ""] {
+            assert_eq!(Dictionary::named(unknown), None, "{unknown}");
+        }
+    }
+}

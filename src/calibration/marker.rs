@@ -1,0 +1,159 @@
+//! `ArUco` markers: a dark quadrilateral is one if its cells are those of a marker.
+
+use nalgebra::{Matrix3, Point2};
+
+use super::dictionary::Dictionary;
+use super::grey::Grey;
+use super::homography;
+use crate::core::geometry::ImagePoint;
+
+/// Difference between white and black cells below which there is no marker \[grey
+/// levels\].
+const LEAST_CONTRAST: f64 = 15.0;
+/// Share of the border's cells that may be misread.
+const BORDER_FORGIVEN: f64 = 0.1;
+/// A cell's colour is the mean of so many places along each of its sides, and this part
+/// of it about its middle.
+const PLACES: u32 = 3;
+const PART: f64 = 0.5;
+
+/// A marker in a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Marker {
+    /// Its number in its dictionary.
+    pub number: usize,
+    /// The corners of its black border \[px\]: upper left, upper right, lower right,
+    /// lower left as it is read.
+    pub corners: [ImagePoint; 4],
+}
+
+/// Cells that were read, row by row; white is true.
+struct Cells {
+    side: usize,
+    white: Vec<bool>,
+}
+
+/// Reads markers among quadrilaterals whose corners run clockwise: those whose number
+/// is below `count`. Of one that was found several times the largest is kept.
+pub fn read_all(
+    grey: &Grey<'_>,
+    quads: &[[ImagePoint; 4]],
+    dictionary: Dictionary,
+    count: usize,
+) -> Vec<Marker> {
+    let mut found: Vec<Marker> = Vec::new();
+    for marker in quads.iter().filter_map(|quad| read(grey, quad, dictionary, count)) {
+        match found.iter_mut().find(|other| is_same(other, &marker)) {
+            Some(other) if area(&marker) > area(other) => *other = marker,
+            Some(_) => {}
+            None => found.push(marker),
+        }
+    }
+    found
+}
+
+/// The quadrilaterals passed the other way round: as a mirror would show them.
+pub fn mirrored(quads: &[[ImagePoint; 4]]) -> Vec<[ImagePoint; 4]> {
+    quads.iter().map(|&[a, b, c, d]| [d, c, b, a]).collect()
+}
+
+impl Marker {
+    /// Middle of its corners \[px\].
+    pub fn middle(&self) -> ImagePoint {
+        ImagePoint::from(
+            self.corners.iter().map(|c| c.coords).sum::<nalgebra::Vector2<f64>>() / 4.0,
+        )
+    }
+
+    /// Mean length of its sides \[px\].
+    pub fn side_px(&self) -> f64 {
+        (0..4).map(|i| (self.corners[(i + 1) % 4] - self.corners[i]).norm()).sum::<f64>() / 4.0
+    }
+}
+
+fn area(marker: &Marker) -> f64 {
+    let [a, b, c, d] = marker.corners;
+    0.5 * (c - a).perp(&(d - b)).abs()
+}
+
+fn is_same(a: &Marker, b: &Marker) -> bool {
+    a.number == b.number && (a.middle() - b.middle()).norm() < 0.5 * a.side_px()
+}
+
+fn read(
+    grey: &Grey<'_>,
+    quad: &[ImagePoint; 4],
+    dictionary: Dictionary,
+    count: usize,
+) -> Option<Marker> {
+    let mut cells = Cells::of(grey, quad, dictionary.side())?;
+    let codes = dictionary.codes();
+    let codes = &codes[..count.min(codes.len())];
+    let mut best: Option<(u32, Marker)> = None;
+    for turn in 0..4 {
+        let seen = cells.code();
+        for (number, code) in codes.iter().enumerate() {
+            let wrong = (seen ^ code).count_ones();
+            if wrong <= dictionary.forgiven() && best.is_none_or(|(least, _)| wrong < least) {
+                let corners = std::array::from_fn(|i| quad[(turn + i) % 4]);
+                best = Some((wrong, Marker { number, corners }));
+            }
+        }
+        cells = cells.turned();
+    }
+    best.map(|(_, marker)| marker)
+}
+
+impl Cells {
+    /// `None` where the quadrilateral leaves the picture, shows no contrast, or has no
+    /// dark border.
+    #[expect(clippy::cast_precision_loss, reason = "a handful of cells")]
+    fn of(grey: &Grey<'_>, quad: &[ImagePoint; 4], side: usize) -> Option<Self> {
+        let all = side + 2;
+        let end = all as f64;
+        let square = [[0.0, 0.0], [end, 0.0], [end, end], [0.0, end]].map(Point2::from);
+        let pairs: Vec<_> = square.into_iter().zip(*quad).collect();
+        let map = homography::homography(&pairs)?;
+        let values: Vec<f64> = (0..all * all)
+            .map(|i| colour(grey, &map, ((i % all) as f64, (i / all) as f64)))
+            .collect::<Option<_>>()?;
+        let (dark, bright) = values
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &v| (a.min(v), b.max(v)));
+        if bright - dark < LEAST_CONTRAST {
+            return None;
+        }
+        let is_white =
+            |column: usize, row: usize| values[row * all + column] > f64::midpoint(dark, bright);
+        let on_border = |i: &usize| [i % all, i / all].iter().any(|&at| at == 0 || at + 1 == all);
+        let wrong = (0..all * all).filter(on_border).filter(|i| is_white(i % all, i / all)).count();
+        if wrong as f64 > BORDER_FORGIVEN * 4.0 * (end - 1.0) {
+            return None;
+        }
+        let white = (0..side * side).map(|i| is_white(1 + i % side, 1 + i / side)).collect();
+        Some(Self { side, white })
+    }
+
+    /// As a number, the upper left cell as its highest bit.
+    fn code(&self) -> u64 {
+        self.white.iter().fold(0, |code, &white| code << 1 | u64::from(white))
+    }
+
+    /// As read from the next corner.
+    fn turned(&self) -> Self {
+        let side = self.side;
+        let at = |i: usize| self.white[(i % side) * side + side - 1 - i / side];
+        Self { side, white: (0..side * side).map(at).collect() }
+    }
+}
+
+/// Mean grey value about the middle of a cell; `None` where it leaves the picture.
+fn colour(grey: &Grey<'_>, map: &Matrix3<f64>, (column, row): (f64, f64)) -> Option<f64> {
+    let part = |k: u32| 0.5 + PART * (f64::from(k) / f64::from(PLACES - 1) - 0.5);
+    let mut sum = 0.0;
+    for i in 0..PLACES * PLACES {
+        let at = Point2::new(column + part(i % PLACES), row + part(i / PLACES));
+        sum += grey.at(Point2::from_homogeneous(map * at.to_homogeneous())?)?;
+    }
+    Some(sum / f64::from(PLACES * PLACES))
+}

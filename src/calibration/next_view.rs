@@ -1,0 +1,219 @@
+//! What one more picture of the board would bring, and how the board should be held
+//! for it.
+
+use nalgebra::{Point3, Rotation3, Vector3};
+use rayon::prelude::*;
+
+use super::board::{Board, all_seen};
+use super::covariance::{Covariance, Reading};
+use super::equations::Corner;
+use super::map;
+use super::share;
+use super::solve::Solution;
+use crate::core::geometry::{ImagePoint, Pose};
+use crate::core::units::Mm;
+
+/// Tilts that are tried \[degrees\].
+const TILTS_DEG: [f64; 2] = [20.0, 40.0];
+/// Distances that are tried, over the usual one.
+const DISTANCES: [f64; 3] = [0.6, 0.8, 1.0];
+/// Places that are tried along each side of the picture.
+const PLACES: u32 = 3;
+/// Part of what is open that a picture must take away to be worth while.
+const WORTH: f64 = 0.03;
+
+/// A picture that would help.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NextView {
+    /// How the board is held.
+    pub hold: Hold,
+    /// Middle of the board in the picture, as parts of its width and height.
+    pub at: (f64, f64),
+    /// What a width is known to where boards were seen, before and after it: share of
+    /// the width.
+    pub share: (f64, f64),
+}
+
+/// How a board is held before the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Hold {
+    /// It lies on the bed.
+    OnBed,
+    /// It is held freely.
+    Free {
+        /// The side of the board that is nearer to the camera: as the picture's axes, x
+        /// to the right and y down; (0, 0) for a board that is not tilted.
+        nearer: (i8, i8),
+        /// How far it is tilted \[degrees\].
+        tilt_deg: f64,
+        /// Distance of the board over the mean of the others'.
+        distance: f64,
+    },
+}
+
+/// The picture that would leave least open in the width of a bead, in mm, on surfaces of
+/// these heights, where boards were seen; where such a bead is not seen whole there, in
+/// that of one that fills a third of that part of the picture. `None` where no further
+/// one brings anything to speak of.
+pub fn best(
+    board: &Board,
+    solution: &Solution,
+    covariance: &Covariance,
+    (bead_mm, heights): (f64, &[Mm]),
+) -> Option<NextView> {
+    let told = heights.iter().flat_map(|&height| {
+        map::where_seen(covariance, bead_mm, height).into_iter().map(move |ends| (ends, height))
+    });
+    let mut beads: Vec<Bead> = told.collect();
+    if beads.is_empty() {
+        beads = share::beads_where_seen(covariance);
+    }
+    let readings = readings(covariance, &beads);
+    let before = share::largest(covariance, &readings)?;
+    let distance_mm = mean_distance_mm(solution);
+    let tried: Vec<NextView> = candidates()
+        .into_par_iter()
+        .filter_map(|(at, hold)| {
+            let after = match hold {
+                Hold::OnBed => {
+                    let lies = on_bed(board, covariance, at)?;
+                    let corners = seen_whole(board, covariance, &covariance.on_bed(lies))?;
+                    let with = covariance.with_another_on_bed(lies, &corners)?;
+                    share::largest(&with, &self::readings(&with, &beads))?
+                }
+                Hold::Free { .. } => {
+                    let pose = pose(board, covariance, (at, hold), distance_mm)?;
+                    let corners = seen_whole(board, covariance, &pose)?;
+                    share::largest(&covariance.with_another(&pose, &corners)?, &readings)?
+                }
+            };
+            Some(NextView { hold, at, share: (before, after) })
+        })
+        .collect();
+    let best = tried.into_iter().min_by(|a, b| a.share.1.total_cmp(&b.share.1))?;
+    (best.share.1 < (1.0 - WORTH) * before).then_some(best)
+}
+
+/// Ends of a bead in the picture, and the height of its surface.
+type Bead = ([ImagePoint; 2], Mm);
+
+fn readings(covariance: &Covariance, beads: &[Bead]) -> Vec<Reading> {
+    beads.iter().filter_map(|&(ends, height)| covariance.width(ends, height)).collect()
+}
+
+fn candidates() -> Vec<((f64, f64), Hold)> {
+    let part = |i: u32| (f64::from(i) + 0.5) / f64::from(PLACES);
+    let mut all = Vec::new();
+    for place in 0..PLACES * PLACES {
+        let at = (part(place % PLACES), part(place / PLACES));
+        all.push((at, Hold::OnBed));
+        for distance in DISTANCES {
+            all.push((at, Hold::Free { nearer: (0, 0), tilt_deg: 0.0, distance }));
+            for tilt_deg in TILTS_DEG {
+                for nearer in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
+                    all.push((at, Hold::Free { nearer, tilt_deg, distance }));
+                }
+            }
+        }
+    }
+    all
+}
+
+fn place_px(covariance: &Covariance, at: (f64, f64)) -> ImagePoint {
+    let [width, height] = covariance.image_size_px().map(f64::from);
+    ImagePoint::new(at.0 * width, at.1 * height)
+}
+
+fn middle_mm(board: &Board) -> Vector3<f64> {
+    board.corners_mm().last().map_or_else(Vector3::zeros, |far| far.coords / 2.0)
+}
+
+/// Where a board would lie on the bed, turned like the first one, with its middle at a
+/// place of the picture.
+fn on_bed(board: &Board, covariance: &Covariance, at: (f64, f64)) -> Option<[f64; 3]> {
+    let map = covariance.surface(covariance.thickness());
+    let on_face = map.to_mm(place_px(covariance, at))?;
+    // The bed's axes are the board's, with y turned over if z is.
+    let first = covariance.on_bed([0.0; 3]);
+    let sign = if (first.rotation() * Vector3::z()).dot(&first.translation_mm()) > 0.0 {
+        -1.0
+    } else {
+        1.0
+    };
+    let middle = middle_mm(board);
+    Some([on_face.x - middle.x, sign * on_face.y - middle.y, 0.0])
+}
+
+/// Where the board would be, its middle in the middle of the candidate's place.
+fn pose(
+    board: &Board,
+    covariance: &Covariance,
+    (at, hold): ((f64, f64), Hold),
+    distance_mm: f64,
+) -> Option<Pose> {
+    let Hold::Free { nearer, tilt_deg, distance } = hold else { return None };
+    let ray = covariance.model().camera.ray(place_px(covariance, at))?;
+    let (x, y) = (f64::from(nearer.0), f64::from(nearer.1));
+    // Turned about an axis of the picture so that the named side comes nearer.
+    let rotation = Rotation3::new(Vector3::new(-y, x, 0.0) * tilt_deg.to_radians());
+    let middle = Vector3::new(ray.x, ray.y, 1.0) * (distance_mm * distance);
+    Some(Pose::from_parts(rotation, middle - rotation * middle_mm(board)))
+}
+
+/// The corners as they would be seen; `None` if not all of them are.
+fn seen_whole(board: &Board, covariance: &Covariance, pose: &Pose) -> Option<Vec<Corner>> {
+    let [right, bottom] = covariance.image_size_px().map(|px| f64::from(px) - 1.0);
+    let camera = &covariance.model().camera;
+    let inside = |px: &ImagePoint| (0.0..=right).contains(&px.x) && (0.0..=bottom).contains(&px.y);
+    let seen = |corner: Point3<f64>| camera.project(pose.apply(corner)).filter(inside);
+    let corners: Option<Vec<ImagePoint>> = board.corners_mm().into_iter().map(seen).collect();
+    Some(board.place(&all_seen(&corners?)))
+}
+
+fn mean_distance_mm(solution: &Solution) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "a count of pictures")]
+    let count = solution.views.len().max(1) as f64;
+    solution.views.iter().map(|view| view.pose.translation_mm().z).sum::<f64>() / count
+}
+
+impl std::fmt::Display for NextView {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let place = place_words(self.at);
+        match self.hold {
+            Hold::OnBed => {
+                write!(f, "the board flat on the bed once more, in the {place} (--plane again)")
+            }
+            Hold::Free { nearer, tilt_deg, distance } => {
+                let distance = match distance {
+                    d if d < 0.7 => ", nearer to the camera by 40 %",
+                    d if d < 0.9 => ", nearer to the camera by 20 %",
+                    _ => "",
+                };
+                let side = match nearer {
+                    (1, _) => "right",
+                    (-1, _) => "left",
+                    (_, 1) => "lower",
+                    (_, -1) => "upper",
+                    _ => return write!(f, "the board in the {place}{distance}, not tilted"),
+                };
+                write!(
+                    f,
+                    "the board in the {place}{distance}, its {side} side {tilt_deg:.0} degrees \
+                     nearer than the other"
+                )
+            }
+        }
+    }
+}
+
+fn place_words((x, y): (f64, f64)) -> String {
+    let third = |part: f64, words: [&'static str; 3]| {
+        words[usize::from(part > 0.34) + usize::from(part > 0.66)]
+    };
+    match (third(y, ["upper", "", "lower"]), third(x, ["left", "", "right"])) {
+        ("", "") => "middle of the picture".to_owned(),
+        ("", across) => format!("{across} part of the picture"),
+        (down, "") => format!("{down} part of the picture"),
+        (down, across) => format!("{down} {across} corner of the picture"),
+    }
+}

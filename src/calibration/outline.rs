@@ -1,0 +1,222 @@
+//! Whether a checkerboard ends where it should: a larger board than the one that was
+//! told contains the smaller one, and every corner of it fits, but its origin and its
+//! counts are wrong.
+
+use super::board::Board;
+use super::grey::Grey;
+use crate::core::geometry::ImagePoint;
+use crate::numeric::rank;
+
+/// Difference between squares of both colours from which on a row of squares belongs
+/// to a board, as a share of that between the squares within.
+const GOES_ON: f64 = 0.3;
+/// The same over the standard deviation of squares of one colour.
+const CLEARLY: f64 = 2.0;
+/// Scatter of squares of one colour, as a share of the same, from which on they are not
+/// plain.
+const UNEVEN: f64 = 0.15;
+/// Standard deviation within a square, as a share of that difference, up to which it is
+/// one colour: less than that of a square of whose places a third lie on the border to
+/// the next square.
+const PLAIN: f64 = 0.25;
+/// Squares of a row that must lie in the picture for it to tell, if it has as many.
+const FEWEST: usize = 3;
+/// A square's colour is the mean of so many places along each of its sides, well
+/// within it.
+const PLACES: u32 = 3;
+
+/// A side of the board in the order of its corners.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Before the first column.
+    FirstColumn,
+    /// After the last column.
+    LastColumn,
+    /// Before the first row.
+    FirstRow,
+    /// After the last row.
+    LastRow,
+}
+
+impl Side {
+    const ALL: [Self; 4] = [Self::FirstColumn, Self::LastColumn, Self::FirstRow, Self::LastRow];
+}
+
+/// Where a board does not end as it should.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Outline {
+    /// Beyond these sides it goes on for a further row of squares.
+    pub goes_on: Vec<Side>,
+    /// Beyond these there is no row of squares at all: what was taken for corners there
+    /// are the ends of the board's squares, or none.
+    pub ends_early: Vec<Side>,
+    /// Squares of one colour differ so much from each other that there may be something in
+    /// them.
+    pub is_uneven: bool,
+    /// The first of the squares within is bright: on a board whose opposite corners have
+    /// two colours the corners were counted from the wrong end.
+    pub is_first_bright: bool,
+}
+
+/// Looks at the two rows of squares beyond each side; says nothing of a side where they
+/// leave the picture.
+pub fn look(board: &Board, grey: &Grey<'_>, corners: &[ImagePoint]) -> Outline {
+    let mut outline = Outline::default();
+    let (columns, rows) = board.corners();
+    if corners.len() != columns * rows {
+        return outline;
+    }
+    let at = |column: usize, row: usize| corners[row * columns + column];
+    let inner = (0..(columns - 1) * (rows - 1)).filter_map(|i| {
+        let (column, row) = (i % (columns - 1), i / (columns - 1));
+        let square =
+            [at(column, row), at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)];
+        Some((column + row, Shade::of(grey, square)?.mean))
+    });
+    let Some(Difference { even_less_odd: contrast, scatter }) = Difference::of(inner) else {
+        return outline;
+    };
+    outline.is_uneven = scatter > UNEVEN * contrast.abs();
+    outline.is_first_bright = contrast > 0.0;
+    for side in Side::ALL {
+        let line = |depth: usize, along: usize| match side {
+            Side::FirstColumn => at(depth, along),
+            Side::LastColumn => at(columns - 1 - depth, along),
+            Side::FirstRow => at(along, depth),
+            Side::LastRow => at(along, rows - 1 - depth),
+        };
+        let count =
+            if matches!(side, Side::FirstColumn | Side::LastColumn) { rows } else { columns };
+        // The outermost corner and the next two outwards.
+        let beyond: Vec<[ImagePoint; 3]> = (0..count)
+            .map(|along| {
+                let [first, second] = beyond([line(0, along), line(1, along), line(2, along)]);
+                [line(0, along), first, second]
+            })
+            .collect();
+        let row = |depth: usize| Row::of(grey, &beyond, depth);
+        // Columns and rows of the squares beyond, counted on from those within.
+        let first = match side {
+            Side::FirstColumn | Side::FirstRow => 2,
+            Side::LastColumn => columns,
+            Side::LastRow => rows,
+        };
+        if row(0).and_then(|row| row.alternates(contrast)) == Some(false) {
+            outline.ends_early.push(side);
+        } else if row(1).is_some_and(|row| row.continues(first, contrast)) {
+            outline.goes_on.push(side);
+        }
+    }
+    outline
+}
+
+/// The squares of a row beyond a side, as far as they lie in the picture.
+struct Row {
+    /// Each with its number along the side.
+    shades: Vec<(usize, Shade)>,
+}
+
+impl Row {
+    /// The next row to the board, or the one after it. `None` where too few of its squares
+    /// lie in the picture.
+    fn of(grey: &Grey<'_>, beyond: &[[ImagePoint; 3]], depth: usize) -> Option<Self> {
+        let shades: Vec<(usize, Shade)> = beyond
+            .windows(2)
+            .enumerate()
+            .filter_map(|(along, pair)| {
+                let [near, far] = [pair[0], pair[1]];
+                let square = [near[depth], near[depth + 1], far[depth], far[depth + 1]];
+                Some((along, Shade::of(grey, square)?))
+            })
+            .collect();
+        (shades.len() >= FEWEST.min(beyond.len() - 1)).then_some(Self { shades })
+    }
+
+    /// Whether its squares alternate at all. `None` where all that are seen have one
+    /// colour on a board.
+    fn alternates(&self, contrast: f64) -> Option<bool> {
+        self.difference(0).map(|found| found.is_clear(contrast))
+    }
+
+    /// Whether it is a row of the same board: its squares alternate in step with those
+    /// within, `first` being the number of its first square among them, and most are plain.
+    /// What lies behind a board may be bright and dark in turn, too.
+    fn continues(&self, first: usize, contrast: f64) -> bool {
+        let Some(found) = self.difference(first) else { return false };
+        let mut spreads: Vec<f64> = self.shades.iter().map(|(_, shade)| shade.spread).collect();
+        let is_plain =
+            rank::median(&mut spreads).is_some_and(|spread| spread <= PLAIN * contrast.abs());
+        found.is_clear(contrast) && found.even_less_odd * contrast > 0.0 && is_plain
+    }
+
+    fn difference(&self, first: usize) -> Option<Difference> {
+        Difference::of(self.shades.iter().map(|(along, shade)| (first + along, shade.mean)))
+    }
+}
+
+/// Between the squares of both colours \[grey levels\].
+struct Difference {
+    /// Mean of the even squares less that of the odd ones.
+    even_less_odd: f64,
+    /// Standard deviation of squares of one kind.
+    scatter: f64,
+}
+
+impl Difference {
+    /// Between squares that are given with their numbers; `None` without one of either
+    /// colour.
+    fn of(squares: impl Iterator<Item = (usize, f64)>) -> Option<Self> {
+        let mut sums = [(0.0, 0.0, 0.0); 2];
+        for (number, value) in squares {
+            let (count, sum, square) = &mut sums[number % 2];
+            *count += 1.0;
+            *sum += value;
+            *square += value * value;
+        }
+        let [even, odd] = sums.map(|(count, sum, _)| sum / count);
+        let within = |(count, sum, square): (f64, f64, f64)| square - sum * sum / count;
+        let free = sums[0].0 + sums[1].0 - 2.0;
+        let scatter = ((within(sums[0]) + within(sums[1])).max(0.0) / free.max(1.0)).sqrt();
+        (even - odd).is_finite().then_some(Self { even_less_odd: even - odd, scatter })
+    }
+
+    fn is_clear(&self, contrast: f64) -> bool {
+        self.even_less_odd.abs() > (GOES_ON * contrast.abs()).max(CLEARLY * self.scatter)
+    }
+}
+
+/// The next two corners after three along a line, going outwards; the first two of
+/// the three are the outermost. To the second order, for the lens and the tilt.
+fn beyond([outer, next, third]: [ImagePoint; 3]) -> [ImagePoint; 2] {
+    let extend = |a: ImagePoint, b: ImagePoint, c: ImagePoint| {
+        ImagePoint::from(a.coords * 3.0 - b.coords * 3.0 + c.coords)
+    };
+    let first = extend(outer, next, third);
+    [first, extend(first, outer, next)]
+}
+
+/// What a square looks like well within it \[grey levels\].
+struct Shade {
+    mean: f64,
+    /// Standard deviation of its places.
+    spread: f64,
+}
+
+impl Shade {
+    /// Of a square given row by row; `None` where it leaves the picture.
+    fn of(grey: &Grey<'_>, square: [ImagePoint; 4]) -> Option<Self> {
+        let [above, below] = [[square[0], square[1]], [square[2], square[3]]];
+        let between = |ends: [ImagePoint; 2], part: f64| ends[0] + (ends[1] - ends[0]) * part;
+        let part = |k: u32| 0.3 + 0.4 * f64::from(k) / f64::from(PLACES - 1);
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for i in 0..PLACES * PLACES {
+            let (right, down) = (part(i % PLACES), part(i / PLACES));
+            let value = grey.at(between([between(above, right), between(below, right)], down))?;
+            sum += value;
+            squares += value * value;
+        }
+        let count = f64::from(PLACES * PLACES);
+        let mean = sum / count;
+        Some(Self { mean, spread: (squares / count - mean * mean).max(0.0).sqrt() })
+    }
+}

@@ -1,0 +1,8 @@
+//! Configuration files: read strictly, with every violation reported at once,
+//! each with its line.
+
+pub mod control;
+pub mod extruder;
+pub mod file;
+
+pub use file::{Camera, Cell, Mount, Recording, Robot, Source};

@@ -1,0 +1,235 @@
+//! `[control]` and `[limits]`: what the controller is to do, and what it may.
+
+use crate::core::time::Span;
+use crate::core::units::{Mm, MmPerS, MmPerS2};
+use crate::document::Table;
+use crate::width_control::limiter::Limits;
+use crate::width_control::pi::PiGains;
+use crate::width_control::target::{Knot, Layers, Target};
+
+/// Fastest that any robot of this kind moves, as a bound on typing errors.
+const ANY_SPEED: std::ops::RangeInclusive<f64> = 0.0..=10_000.0;
+
+/// How far the flow wanders along a metre of path unless the file says so, as a
+/// share.
+const DRIFT_PER_ROOT_M: f64 = 0.0055;
+
+/// Change of the speed in a course of steps, as a share, and what it may be.
+const STEP_SHARE: f64 = 0.1;
+/// Shares that a step may have: less shows in no width, more is no small step.
+pub const STEP_SHARES: std::ops::RangeInclusive<f64> = 0.02..=0.3;
+
+/// Keys of the PI law's gains, and what they may be.
+const GAINS: [&str; 2] = ["kp_per_s", "ki_per_s2"];
+const ANY_GAIN: std::ops::RangeInclusive<f64> = 0.0..=1e4;
+
+/// How the width is held.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum WidthLaw {
+    /// Proportional-integral, on the width that is seen.
+    Pi,
+    /// By distance, with the PI law to fall back to.
+    Distance(Exponent),
+    /// Not at all: the speed goes through a course of steps, each by this share of
+    /// the start speed.
+    Steps(f64),
+}
+
+/// What the law by distance is told of the bead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Exponent {
+    /// b in w = A·(v/v₀)^−b.
+    pub value: f64,
+    /// Whether it is learnt from the data.
+    pub learns: bool,
+    /// How far the flow wanders along a metre, as a share.
+    pub drift_per_root_m: f64,
+}
+
+/// What the width controller is to do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Control {
+    /// Width that is asked for.
+    pub target: Target,
+    /// How it is held.
+    pub law: WidthLaw,
+    /// Gains of the PI law, on the error in millimetres; none where it is only
+    /// fallen back to and the file gives none.
+    pub gains: Option<PiGains>,
+    /// Longest time between two widths over which the loop integrates; beyond
+    /// it holds.
+    pub max_gap: Span,
+    /// Longest hold before the controller gives up and stops the robot.
+    pub max_hold: Span,
+}
+
+/// `target_width_mm`, which stands alone in a cell that only measures.
+pub fn read_target(control: &Table<'_>) -> Option<Mm> {
+    control.number("target_width_mm", 0.1..=1000.0).and_then(|v| Mm::new(v).ok())
+}
+
+/// The law that a cell names.
+#[derive(Debug, Clone, Copy)]
+enum Named {
+    Pi,
+    Distance,
+    Steps,
+}
+
+/// The rest of `[control]`. There are no defaults for gains, nor for the
+/// exponent.
+pub fn read_control(control: &Table<'_>, target: Option<Target>) -> Option<Control> {
+    let laws = [("pi", Named::Pi), ("distance", Named::Distance), ("steps", Named::Steps)];
+    let law = control.required_choice("law", &laws);
+    let gains = read_gains(control);
+    // A law that is but fallen back to, or not followed, may be without gains.
+    let spared = matches!(law, Some(Named::Distance | Named::Steps))
+        && !GAINS.iter().any(|key| control.has(key));
+    if !spared {
+        for key in GAINS.iter().filter(|key| !control.has(key)) {
+            control.absent(key, "a number; there are no defaults for gains");
+        }
+    }
+    let law = match law {
+        Some(Named::Distance) => read_exponent(control).map(WidthLaw::Distance),
+        Some(Named::Pi) => Some(WidthLaw::Pi),
+        Some(Named::Steps) => {
+            control.number_or("step_share", STEP_SHARES, STEP_SHARE).map(WidthLaw::Steps)
+        }
+        None => {
+            control.pass_over();
+            None
+        }
+    };
+    let max_gap = control.number("max_gap_s", 0.01..=60.0);
+    let max_hold = control.number("max_hold_s", 0.1..=3600.0);
+    Some(Control {
+        target: target?,
+        law: law?,
+        gains: if spared { None } else { Some(gains?) },
+        max_gap: Span::from_secs(max_gap?),
+        max_hold: Span::from_secs(max_hold?),
+    })
+}
+
+/// Gains of the PI law, where both stand in the file.
+fn read_gains(control: &Table<'_>) -> Option<PiGains> {
+    // The 2022 paper counts the error in pixels; its gains are of that unit.
+    let unit = control.number_or("error_unit_mm", 1e-4..=1e3, 1.0)?;
+    let [kp, ki] = GAINS.map(|key| control.optional_number(key, ANY_GAIN));
+    Some(PiGains { kp_per_s: kp? / unit, ki_per_s2: ki? / unit })
+}
+
+fn read_exponent(control: &Table<'_>) -> Option<Exponent> {
+    let value = control.number("exponent", 0.02..=2.0);
+    let learns = control.choice("exponent_learns", &[("yes", true), ("no", false)]);
+    let drift = control.number_or("drift_per_root_m", 1e-5..=1.0, DRIFT_PER_ROOT_M);
+    Some(Exponent { value: value?, learns: learns?, drift_per_root_m: drift? })
+}
+
+/// Refuses steps that leave the speeds that setpoints may have.
+pub fn check_steps(control: &Table<'_>, law: WidthLaw, start: MmPerS, limits: Limits) {
+    let WidthLaw::Steps(share) = law else { return };
+    let (slow, fast) = (start * (1.0 - share), start * (1.0 + share));
+    if slow < limits.min_speed || fast > limits.max_speed {
+        let (low, high) = (limits.min_speed, limits.max_speed);
+        let found = format!("{share}, which is {:.1} to {:.1} mm/s", slow.get(), fast.get());
+        control.report("step_share", found, format!("speeds within [limits], {low} to {high}"));
+    }
+}
+
+/// Reports a target that the gauge would refuse as no width of the bead's. `layers` is the
+/// section of the layers' widths.
+pub fn check_target(
+    control: &Table<'_>,
+    layers: Option<&Table<'_>>,
+    target: &Target,
+    (low, high): (Mm, Mm),
+) {
+    let outside = |width: &Mm| *width < low || *width > high;
+    let report = |table: &Table<'_>, key: &'static str, width: Mm| {
+        let expected = format!("within width_range_mm of [gauge], {low} to {high}");
+        table.report(key, format!("{}", width.get()), expected);
+    };
+    if outside(&target.nominal()) {
+        report(control, "target_width_mm", target.nominal());
+    }
+    if let Some(width) = target.knots().iter().map(|knot| knot.width).find(outside) {
+        report(control, "path_width_mm", width);
+    }
+    let widths = target.layers().map(|layers| layers.widths.as_slice()).unwrap_or_default();
+    if let (Some(table), Some(width)) = (layers, widths.iter().copied().find(outside)) {
+        report(table, "width_mm", width);
+    }
+}
+
+/// The width that is asked for, with its course along the path and by layer.
+pub fn read_course(
+    control: &Table<'_>,
+    layers: Option<&Table<'_>>,
+    width: Option<Mm>,
+) -> Option<Target> {
+    let along = read_along(control);
+    let layers = layers.map(read_layers);
+    let mut target = Target::constant(width?).along(along?);
+    if let Some(layers) = layers {
+        target = target.by_layer(layers?);
+    }
+    Some(target)
+}
+
+/// `path_mm` and `path_width_mm`, which belong together.
+fn read_along(control: &Table<'_>) -> Option<Vec<Knot>> {
+    if !control.has("path_mm") && !control.has("path_width_mm") {
+        return Some(Vec::new());
+    }
+    let places = control.list("path_mm", 0.0..=1e7);
+    let widths = control.list("path_width_mm", 0.1..=1000.0);
+    let (places, widths) = (places?, widths?);
+    if places.len() != widths.len() {
+        let found = format!("{} numbers", widths.len());
+        control.report("path_width_mm", found, format!("{}, one for each path_mm", places.len()));
+        return None;
+    }
+    let falls = places.iter().zip(places.iter().skip(1)).find(|(before, after)| after < before);
+    if let Some((before, after)) = falls {
+        let found = format!("{after} after {before}");
+        control.report("path_mm", found, "places in the order of the path; twice one is a step");
+        return None;
+    }
+    let knot = |(path, width): (f64, f64)| {
+        Some(Knot { path: Mm::new(path).ok()?, width: Mm::new(width).ok()? })
+    };
+    places.into_iter().zip(widths).map(knot).collect()
+}
+
+/// `[layers]`.
+fn read_layers(table: &Table<'_>) -> Option<Layers> {
+    let height = table.number("height_mm", 0.01..=1e3);
+    let first = table.number_or("first_z_mm", -1e5..=1e5, 0.0);
+    let widths =
+        if table.has("width_mm") { table.list("width_mm", 0.1..=1000.0) } else { Some(Vec::new()) };
+    let widths: Option<Vec<Mm>> = widths?.into_iter().map(|width| Mm::new(width).ok()).collect();
+    Some(Layers { first_z: Mm::new(first?).ok()?, height: Mm::new(height?).ok()?, widths: widths? })
+}
+
+/// `[limits]`. There are no defaults for safety.
+pub fn read_limits(limits: &Table<'_>) -> Option<Limits> {
+    let min = limits.number("min_speed_mm_per_s", ANY_SPEED);
+    let max = limits.number("max_speed_mm_per_s", ANY_SPEED);
+    let accel = limits.number("max_accel_mm_per_s2", 1e-3..=1e6);
+    let (min, max) = (min?, max?);
+    if min >= max {
+        limits.report(
+            "max_speed_mm_per_s",
+            max.to_string(),
+            format!("more than min_speed_mm_per_s = {min}"),
+        );
+        return None;
+    }
+    Some(Limits {
+        min_speed: MmPerS::new(min).ok()?,
+        max_speed: MmPerS::new(max).ok()?,
+        max_accel: MmPerS2::new(accel?).ok()?,
+    })
+}

@@ -1,0 +1,266 @@
+//! `[extruder]` and `[extruder_plant]`: what the extruder is told and what it
+//! may be told, and for a simulated cell what answers. There are no defaults
+//! for limits.
+
+mod adaptive;
+mod link;
+mod part;
+mod plant;
+mod pressure;
+mod readings;
+mod screw;
+mod strategy;
+
+use std::path::{Path, PathBuf};
+
+pub use link::ExtruderLink;
+pub use part::{Beside, ExtruderPart};
+pub use plant::{ExtruderPlant, LinearPlant, MeltPlant, PlantKind, PressurePlant, ScrewPlant};
+pub use strategy::{FeedforwardKeys, ModelSource, Strategy};
+
+use crate::core::time::Span;
+use crate::core::units::{MPa, Mm, MmPerS};
+use crate::document::Table;
+use crate::extruder::demand::section;
+use crate::extruder::{
+    CommandLimits, Drive, ExtruderSetup, FlowDemand, Follows, Law, ReadingFilters, RobotFollows,
+};
+
+/// Any number that a command of an extruder can be, as a bound on slips.
+const ANY: std::ops::RangeInclusive<f64> = -1e9..=1e9;
+
+/// The extruder side of a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Extruder {
+    /// What is commanded.
+    pub drive: Drive,
+    /// What commands may be.
+    pub limits: CommandLimits,
+    /// How commands are found.
+    pub strategy: Strategy,
+    /// Height of a layer.
+    pub layer_height: Mm,
+    /// What the flow goes by.
+    pub follows: Follows,
+    /// What the robot's speed goes by besides the width.
+    pub robot_follows: RobotFollows,
+    /// How often what is done.
+    pub rates: Rates,
+    /// Longest time without a report over which the strategy goes on.
+    pub max_gap: Span,
+    /// Longest hold, and longest start, before the pump is stopped.
+    pub max_hold: Span,
+    /// Pressure at which the pump is stopped, if the file says so.
+    pub max_pressure: Option<MPa>,
+    /// What readings pass before the strategy sees them.
+    pub filters: ReadingFilters,
+    /// The file of its starts and stops, if the cell names one.
+    pub starts: Option<PathBuf>,
+    /// The plan of the job, if the cell names one.
+    pub plan: Option<PathBuf>,
+    /// How a live run reaches it, if the file says so.
+    pub link: Option<ExtruderLink>,
+}
+
+/// How often what is done \[Hz\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rates {
+    /// Steps of the feedforward.
+    pub feedforward_hz: f64,
+    /// Steps of the control.
+    pub control_hz: f64,
+    /// Commands and reports.
+    pub io_hz: f64,
+}
+
+/// The keys of a command's limits, which carry its unit.
+struct Keys {
+    value: &'static str,
+    min: &'static str,
+    max: &'static str,
+    rate: &'static str,
+}
+
+const fn keys(drive: Drive) -> Keys {
+    macro_rules! keys {
+        ($unit:literal) => {
+            Keys {
+                value: concat!("constant_", $unit),
+                min: concat!("min_", $unit),
+                max: concat!("max_", $unit),
+                rate: concat!("max_", $unit, "_per_s"),
+            }
+        };
+    }
+    match drive {
+        Drive::Rpm => keys!("rpm"),
+        Drive::Volts => keys!("v"),
+        Drive::Pressure => keys!("mpa"),
+        Drive::Flow => keys!("mm3_per_s"),
+        Drive::MassFlow => keys!("kg_per_s"),
+        Drive::Filling => keys!("filling"),
+    }
+}
+
+impl Extruder {
+    /// Reads `[extruder]`.
+    pub fn read(table: &Table<'_>, folder: &Path) -> Option<Self> {
+        let drive = table.required_choice("command", &Drive::WORDS);
+        let rates = read_rates(table);
+        if drive.is_none() || rates.is_none() {
+            table.pass_over();
+        }
+        let limits = drive.and_then(|drive| read_limits(table, drive));
+        let strategy = drive.zip(rates).and_then(|(drive, rates)| {
+            let about = About { folder, drive, limits, rates };
+            Strategy::read(table, &about)
+        });
+        let height = table.number("layer_height_mm", 1e-3..=1e4);
+        let robot_follows = table.choice(
+            "robot_follows",
+            &[("nothing", RobotFollows::Nothing), ("flow", RobotFollows::Flow)],
+        );
+        let follows = read_follows(table, robot_follows);
+        if robot_follows == Some(RobotFollows::Flow)
+            && strategy.as_ref().is_some_and(|known| !matches!(known, Strategy::Feedforward(_)))
+        {
+            let expected = "strategy = \"feedforward\", whose model foretells the flow";
+            table.report("robot_follows", "\"flow\"", expected);
+        }
+        let max_gap = table.number("max_gap_s", 0.01..=60.0);
+        if let Some((gap, rates)) = max_gap.zip(rates)
+            && gap * rates.io_hz < 1.5
+        {
+            let least =
+                format!("at least {:.3}, one and a half periods of io_rate_hz", 1.5 / rates.io_hz);
+            table.report("max_gap_s", gap.to_string(), least);
+        }
+        let max_hold = table.number("max_hold_s", 0.1..=3600.0);
+        if let Some((gap, hold)) = max_gap.zip(max_hold)
+            && gap > hold
+        {
+            table.report("max_gap_s", gap.to_string(), format!("at most max_hold_s = {hold}"));
+        }
+        let max_pressure = table.optional_number("max_pressure_mpa", 1e-6..=1e4);
+        let filters = readings::read(table);
+        let named = |key| table.has(key).then(|| table.text(key)).flatten();
+        let [starts, plan] = ["starts", "plan"].map(|key| named(key).map(|file| folder.join(file)));
+        if plan.is_some()
+            && strategy.as_ref().is_some_and(|known| !matches!(known, Strategy::Feedforward(_)))
+        {
+            let expected = "strategy = \"feedforward\", with the model that was planned with";
+            table.report("plan", "the plan of a job", expected);
+        }
+        if starts.is_some()
+            && strategy.as_ref().is_some_and(|known| !known.stands_while_the_flow_comes())
+        {
+            let expected = "strategy = \"constant\" or \"feedforward\": while the flow of a start \
+                            comes the strategy stands at its first command";
+            table.report("starts", "how the extruder starts and stops", expected);
+        }
+        let link = link::read(table, rates.map(|rates| rates.io_hz));
+        Some(Self {
+            drive: drive?,
+            limits: limits?,
+            strategy: strategy?,
+            layer_height: Mm::new(height?).ok()?,
+            follows: follows?,
+            robot_follows: robot_follows?,
+            rates: rates?,
+            max_gap: Span::from_secs(max_gap?),
+            max_hold: Span::from_secs(max_hold?),
+            max_pressure: max_pressure.and_then(|pressure| MPa::new(pressure).ok()),
+            filters: filters?,
+            starts,
+            plan,
+            link,
+        })
+    }
+
+    /// The flow of a bead of this width at this speed; reports a bead that is
+    /// narrower than it is high.
+    pub fn demand(&self, table: &Table<'_>, width: Mm, speed: MmPerS) -> Option<FlowDemand> {
+        match section(width, self.layer_height) {
+            Ok(section) => Some(FlowDemand::new(section, speed, self.follows)),
+            Err(error) => {
+                table.report("layer_height_mm", self.layer_height.to_string(), error.to_string());
+                None
+            }
+        }
+    }
+
+    /// What the extruder side of a controller has to know, with the law that
+    /// the strategy came to; without what other files tell of starts and of a job.
+    pub fn setup(&self, law: Law) -> ExtruderSetup {
+        let period = |hz: f64| Span::from_secs(1.0 / hz);
+        ExtruderSetup {
+            drive: self.drive,
+            law,
+            limits: self.limits,
+            feedforward_period: period(self.rates.feedforward_hz),
+            control_period: period(self.rates.control_hz),
+            io_period: period(self.rates.io_hz),
+            max_gap: self.max_gap,
+            max_hold: self.max_hold,
+            max_pressure: self.max_pressure,
+            filters: self.filters,
+            robot_follows: self.robot_follows,
+            timing: None,
+            plan: None,
+        }
+    }
+}
+
+/// What the reading of a strategy hangs on.
+struct About<'a> {
+    folder: &'a Path,
+    drive: Drive,
+    limits: Option<CommandLimits>,
+    rates: Rates,
+}
+
+/// A flow that follows the robot, and a robot that follows the flow, would lead
+/// each other to a stand.
+fn read_follows(table: &Table<'_>, robot_follows: Option<RobotFollows>) -> Option<Follows> {
+    let words = [("robot", Follows::Robot), ("start_speed", Follows::StartSpeed)];
+    if robot_follows != Some(RobotFollows::Flow) {
+        return table.choice("follows", &words);
+    }
+    if !table.has("follows") {
+        return Some(Follows::StartSpeed);
+    }
+    let follows = table.choice("follows", &words);
+    if follows == Some(Follows::Robot) {
+        let expected = "\"start_speed\": with robot_follows = \"flow\" the robot goes by the flow";
+        table.report("follows", "\"robot\"", expected);
+    }
+    follows
+}
+
+fn read_limits(table: &Table<'_>, drive: Drive) -> Option<CommandLimits> {
+    let keys = keys(drive);
+    let min = table.number(keys.min, ANY);
+    let max = table.number(keys.max, ANY);
+    let rate = table.number(keys.rate, 1e-9..=1e12);
+    let (min, max) = (min?, max?);
+    if min >= max {
+        table.report(keys.max, max.to_string(), format!("more than {} = {min}", keys.min));
+        return None;
+    }
+    CommandLimits::new(min, max, rate?).ok()
+}
+
+fn read_rates(table: &Table<'_>) -> Option<Rates> {
+    let hz = 0.5..=5000.0;
+    let feedforward = table.number_or("feedforward_rate_hz", hz.clone(), 200.0);
+    let control = table.number_or("control_rate_hz", hz.clone(), 20.0);
+    let io = table.number_or("io_rate_hz", hz, 50.0);
+    let rates = Rates { feedforward_hz: feedforward?, control_hz: control?, io_hz: io? };
+    for (key, rate) in [("control_rate_hz", rates.control_hz), ("io_rate_hz", rates.io_hz)] {
+        if rate > rates.feedforward_hz {
+            let most = format!("at most feedforward_rate_hz = {}", rates.feedforward_hz);
+            table.report(key, rate.to_string(), most);
+        }
+    }
+    Some(rates)
+}

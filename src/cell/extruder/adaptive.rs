@@ -1,0 +1,50 @@
+//! `[extruder.adaptive]`: the plant that the adaptive law of the nozzle is made
+//! for, and its gains. There are no defaults for gains.
+
+use super::About;
+use crate::core::time::Span;
+use crate::core::units::Mm2;
+use crate::document::Table;
+use crate::extruder::adaptive::{Adaptation, AdaptiveLaw, Gains, Safety, ScalarPlant};
+use crate::extruder::law::NozzleModel;
+
+const ANY: std::ops::RangeInclusive<f64> = -1e9..=1e9;
+
+/// The law and its nozzle. The law's own conditions are checked here.
+pub(super) fn read(table: &Table<'_>, about: &About<'_>) -> Option<(AdaptiveLaw, NozzleModel)> {
+    let state = table.number("state_gain_per_s", ANY);
+    let input = table.number("input_gain", ANY);
+    let feedback = table.number("feedback", ANY);
+    let error_feedback = table.number_or("error_feedback", ANY, 0.0);
+    let rate = table.number("learning_rate", 0.0..=1e12);
+    let weight = table.number_or("weight", 1e-9..=1e9, 1.0);
+    let slope_rate = table.number_or("slope_rate_per_s", 0.0..=1e6, 0.0);
+    let bound = table.optional_number("bound_kg_per_s", 1e-12..=1e9);
+    let leakage = table.number_or("leakage_per_s", 0.0..=1e3, 0.0);
+    let section = table.number("nozzle_section_mm2", 1e-6..=1e9);
+    let pressure = table.number_or("pressure_kg_per_s", ANY, 0.0);
+    let (learning_rate, weight) = (rate?, weight?);
+    let adaptation = match slope_rate? {
+        _ if learning_rate == 0.0 => Adaptation::Off,
+        0.0 => Adaptation::Constant { learning_rate, weight },
+        slope_rate_per_s => Adaptation::Ramp { learning_rate, weight, slope_rate_per_s },
+    };
+    let gains = Gains {
+        feedback: feedback?,
+        error_feedback: error_feedback?,
+        adaptation,
+        safety: Safety { bound, leakage_per_s: leakage? },
+    };
+    let plant = ScalarPlant { state_gain_per_s: state?, input_gain: input? };
+    let hold = Span::from_secs(1.0 / about.rates.control_hz);
+    match AdaptiveLaw::new(plant, gains, hold) {
+        Ok(law) => {
+            let section = Mm2::new(section?).ok()?;
+            Some((law, NozzleModel { section, pressure_kg_per_s: pressure? }))
+        }
+        Err(error) => {
+            table.report("feedback", gains.feedback.to_string(), error.to_string());
+            None
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! `[extruder]` beside `[extruder_plant]`: what is told, what flow is wanted of
+//! it, and in a simulated cell what answers.
+
+use std::path::Path;
+
+use super::{Extruder, ExtruderPlant, PlantKind, Strategy};
+use crate::core::units::{Mm, Mm3PerS, MmPerS};
+use crate::document::Table;
+use crate::extruder::law::Need;
+use crate::extruder::{Drive, FlowDemand};
+use crate::scenario::table::Simulation;
+
+/// The extruder side of a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtruderPart {
+    /// What it is told.
+    pub extruder: Extruder,
+    /// The flow that is wanted.
+    pub demand: FlowDemand,
+    /// What answers in a simulated cell, if the file says so.
+    pub plant: Option<ExtruderPlant>,
+    /// Flow at which the simulated bead is as wide as `[bead]` says.
+    pub plant_nominal: Mm3PerS,
+}
+
+/// What stands beside the extruder in its cell; none of what could not be read.
+#[derive(Debug, Clone, Copy)]
+pub struct Beside<'a> {
+    /// Width of the bead, and the speed at which it begins.
+    pub bead: Option<(Mm, MmPerS)>,
+    /// Host and port of the robot.
+    pub robot_address: Option<&'a str>,
+    /// The simulated bead.
+    pub simulation: Option<&'a Simulation>,
+}
+
+impl ExtruderPart {
+    /// Reads both tables for what stands beside them; none where the extruder
+    /// goes its own way, and where a violation was reported.
+    pub fn read(root: &Table<'_>, folder: &Path, beside: &Beside<'_>) -> Option<Self> {
+        let plant_table = root.optional_run_table("extruder_plant");
+        let plant = plant_table.as_ref().and_then(ExtruderPlant::read);
+        let Some(table) = root.optional_run_table("extruder") else {
+            if plant_table.is_some() {
+                root.report(
+                    "extruder_plant",
+                    "a plant of no extruder",
+                    "a table [extruder] beside it",
+                );
+            }
+            return None;
+        };
+        let extruder = Extruder::read(&table, folder)?;
+        if let (Some(plant), Some(plant_table)) = (&plant, &plant_table) {
+            compare(&extruder, &table, &plant.kind, plant_table);
+        }
+        if let Some(link) = &extruder.link
+            && beside.robot_address == Some(&link.address)
+        {
+            let expected = "another than robot.address: each has a controller of its own";
+            table.report("address", format!("\"{}\"", link.address), expected);
+        }
+        let (target, speed) = beside.bead?;
+        let demand = extruder.demand(&table, target, speed)?;
+        let model = beside.simulation?.bead;
+        let (width, at) =
+            (Mm::new(model.width_mm).ok()?, MmPerS::new(model.at_speed_mm_per_s).ok()?);
+        let plant_nominal = extruder.demand(&table, width, at)?.nominal();
+        Some(Self { extruder, demand, plant, plant_nominal })
+    }
+}
+
+/// Reports a plant that takes another command than is given, or that never
+/// reports what is needed: nothing of such a cell could be simulated.
+fn compare(extruder: &Extruder, table: &Table<'_>, kind: &PlantKind, plant_table: &Table<'_>) {
+    let taken = match kind {
+        PlantKind::Linear(plant) => plant.screw_lag_s.map(|_| Drive::Rpm),
+        PlantKind::Pressure(_) => Some(Drive::Rpm),
+        PlantKind::Screw(_) => Some(Drive::Filling),
+        PlantKind::Melt(_) => None,
+    };
+    if let Some(taken) = taken.filter(|taken| *taken != extruder.drive) {
+        let found = format!("a plant that is told \"{}\"", taken.word());
+        let given = extruder.drive.word();
+        plant_table.report(
+            "kind",
+            found,
+            format!("one that is told \"{given}\", as [extruder] says"),
+        );
+        return;
+    }
+    let needed = match extruder.strategy {
+        Strategy::Pressure(_) => Some(Need::Pressure),
+        Strategy::Screw(_) => Some(Need::Filled),
+        Strategy::Adaptive(_) => Some(Need::Flow),
+        Strategy::Feedforward(ref keys) => keys.foretold_from.need(),
+        Strategy::Constant { .. } | Strategy::Profile { .. } => None,
+    };
+    let limited = extruder.max_pressure.map(|_| Need::Pressure);
+    let key =
+        if let Strategy::Feedforward(_) = extruder.strategy { "foretold_from" } else { "strategy" };
+    for (key, need) in [(key, needed), ("max_pressure_mpa", limited)] {
+        if let Some(need) = need.filter(|need| !kind.reports(*need)) {
+            let (reading, plant) = match need {
+                Need::Pressure => ("a pressure", "kind = \"pressure\""),
+                Need::Filled => ("a filled length", "kind = \"screw\""),
+                Need::Flow => ("a flow", "flow_sensor_noise_mm3_per_s"),
+                Need::Screw => ("the screw's speed", "screw_lag_s"),
+            };
+            let found = format!("{reading} to go by, which [extruder_plant] never reports");
+            table.report(key, found, format!("one with {plant}, or none at all"));
+        }
+    }
+}

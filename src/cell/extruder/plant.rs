@@ -1,0 +1,286 @@
+//! `[extruder_plant]`: what answers the extruder's commands in a simulated
+//! cell. Nothing here moves a real machine, so most keys have defaults.
+
+use super::pressure::{read_nozzle, read_process};
+use super::screw::read_screw;
+use crate::core::time::Span;
+use crate::core::units::Rpm;
+use crate::document::Table;
+use crate::extruder::law::Need;
+use crate::extruder::pressure::Fopdt;
+use crate::extruder::rheology::PowerLaw;
+use crate::extruder::screw::{Screw, ScrewDesign};
+use crate::numeric::lti::TransferFunction;
+
+const ANY: std::ops::RangeInclusive<f64> = -1e12..=1e12;
+/// Coefficients that a numerator or a denominator may have.
+const COUNTS: [usize; 6] = [1, 2, 3, 4, 5, 6];
+
+/// The simulated extruder of a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtruderPlant {
+    /// What turns commands into flow.
+    pub kind: PlantKind,
+    /// From the order to run until material moves.
+    pub start_delay: Span,
+    /// From the order to stop until nothing moves.
+    pub stop_delay: Span,
+    /// From the order to open or shut the valve until it has done so.
+    pub valve_delay: Span,
+}
+
+/// What turns commands into flow.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PlantKind {
+    /// A transfer function, or a number, with what no model tells.
+    Linear(LinearPlant),
+    /// Lag and dead time to a pressure, and a power law from it to flow.
+    Pressure(PressurePlant),
+    /// A screw that is filled through its feed.
+    Screw(ScrewPlant),
+    /// Melt before a nozzle, from which it recedes while the pump stands.
+    Melt(MeltPlant),
+}
+
+impl PlantKind {
+    /// Whether it has a sensor of that.
+    pub const fn reports(&self, reading: Need) -> bool {
+        match self {
+            Self::Linear(plant) => match reading {
+                Need::Flow => plant.sensor_noise.is_some(),
+                Need::Screw => plant.screw_lag_s.is_some(),
+                Need::Pressure | Need::Filled => false,
+            },
+            Self::Pressure(_) => matches!(reading, Need::Pressure | Need::Screw),
+            Self::Screw(_) => matches!(reading, Need::Filled),
+            Self::Melt(_) => false,
+        }
+    }
+}
+
+/// A pressure at the nozzle in a simulated cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PressurePlant {
+    /// From the screw's speed to the pressure.
+    pub process: Fopdt,
+    /// From the pressure to flow.
+    pub nozzle: PowerLaw,
+    /// Fastest that the screw turns.
+    pub fastest: Rpm,
+    /// Noise of the sensor \[MPa\].
+    pub sensor_noise_mpa: f64,
+    /// A wave of the gain, as a share of it, and its period \[s\].
+    pub gain_wave: (f64, f64),
+    /// A load at the input of the process \[rpm\], and when it comes \[s\].
+    pub load: (f64, f64),
+}
+
+/// Melt that recedes in pauses and drools after stops, in a simulated cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeltPlant {
+    /// Flow for each unit of the command \[mm³/s\].
+    pub gain_mm3_per_s: f64,
+    /// From a command until the drive acts \[s\].
+    pub dead_time_s: f64,
+    /// Time constant of the screw \[s\].
+    pub screw_s: f64,
+    /// Melt that is stored under pressure at the usual flow, over that flow \[s\].
+    pub stored_s: f64,
+    /// What is empty before the nozzle after a long pause \[mm³\].
+    pub void_mm3: f64,
+    /// Standard deviation of that from pause to pause, as a share.
+    pub void_scatter: f64,
+    /// Standard deviation of the flow, as a share.
+    pub flow_scatter: f64,
+}
+
+/// A linear plant from command to flow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearPlant {
+    /// From command to flow \[mm³/s per unit of the command\].
+    pub transfer: TransferFunction,
+    /// An input that the controller does not know of: its value at the start
+    /// of the run \[unit of the command\].
+    pub unknown_input: f64,
+    /// How fast that grows \[unit of the command per second\].
+    pub unknown_input_per_s: f64,
+    /// Standard deviation of a flow that no model tells \[mm³/s\].
+    pub flow_noise: f64,
+    /// How long that hangs together \[s\].
+    pub flow_noise_lag_s: f64,
+    /// Noise of a sensor of the flow \[mm³/s\]; none has no sensor.
+    pub sensor_noise: Option<f64>,
+    /// Time constant with which the screw follows a command in rpm \[s\], as its
+    /// encoder reports; none follows at once and has no encoder.
+    pub screw_lag_s: Option<f64>,
+}
+
+/// A screw in a simulated cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScrewPlant {
+    /// The screw as it is.
+    pub screw: Screw,
+    /// Flow of a screw that is filled all along, at its mean speed \[mm³/s\].
+    pub full_flow_mm3_per_s: f64,
+    /// Filled length at the start of the run \[m\].
+    pub start_m: f64,
+    /// Share of full that was fed until then.
+    pub before: f64,
+    /// Noise of the sensor of the filled length \[mm\].
+    pub sensor_noise_mm: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Word {
+    Direct,
+    Linear,
+    Pressure,
+    Screw,
+    Melt,
+}
+
+const WORDS: [(&str, Word); 5] = [
+    ("direct", Word::Direct),
+    ("linear", Word::Linear),
+    ("pressure", Word::Pressure),
+    ("screw", Word::Screw),
+    ("melt", Word::Melt),
+];
+
+impl ExtruderPlant {
+    /// Reads `[extruder_plant]`.
+    pub fn read(table: &Table<'_>) -> Option<Self> {
+        let word = table.required_choice("kind", &WORDS);
+        let kind = word.and_then(|word| match word {
+            Word::Direct => {
+                let gain = table.number("gain_mm3_per_s", 1e-9..=1e12)?;
+                let transfer = TransferFunction::gain(gain).ok()?;
+                read_linear(table, transfer).map(PlantKind::Linear)
+            }
+            Word::Linear => {
+                let transfer = read_transfer(table)?;
+                read_linear(table, transfer).map(PlantKind::Linear)
+            }
+            Word::Pressure => read_pressure_plant(table).map(PlantKind::Pressure),
+            Word::Screw => read_screw_plant(table).map(PlantKind::Screw),
+            Word::Melt => read_melt(table).map(PlantKind::Melt),
+        });
+        if kind.is_none() {
+            table.pass_over();
+        }
+        let delay = |key| table.number_or(key, 0.0..=60.0, 0.0).map(Span::from_secs);
+        let (start, stop) = (delay("start_delay_s"), delay("stop_delay_s"));
+        let valve = delay("valve_delay_s");
+        Some(Self { kind: kind?, start_delay: start?, stop_delay: stop?, valve_delay: valve? })
+    }
+}
+
+fn read_transfer(table: &Table<'_>) -> Option<TransferFunction> {
+    for (key, what) in [
+        (
+            "numerator",
+            "the coefficients of a linear plant's numerator, the highest power of s \
+                       first, such as [18.0]",
+        ),
+        ("denominator", "those of its denominator, such as [0.656, 0.975, 1.0]"),
+    ] {
+        if !table.has(key) {
+            table.absent(key, what);
+        }
+    }
+    if !(table.has("numerator") && table.has("denominator")) {
+        return None;
+    }
+    let num = table.row("numerator", &COUNTS, ANY);
+    let den = table.row("denominator", &COUNTS, ANY);
+    let dead_time = table.number_or("dead_time_s", 0.0..=1e3, 0.0);
+    let (num, den) = (num?, den?);
+    let transfer = match TransferFunction::new(&num, &den, dead_time?) {
+        Ok(transfer) => transfer,
+        Err(error) => {
+            table.report("denominator", format!("{den:?}"), error.to_string());
+            return None;
+        }
+    };
+    if !transfer.is_stable() {
+        table.report("denominator", format!("{den:?}"), "a plant that is stable");
+        return None;
+    }
+    Some(transfer)
+}
+
+fn read_linear(table: &Table<'_>, transfer: TransferFunction) -> Option<LinearPlant> {
+    let unknown = table.number_or("unknown_input", ANY, 0.0);
+    let unknown_per_s = table.number_or("unknown_input_per_s", ANY, 0.0);
+    let noise = table.number_or("flow_noise_mm3_per_s", 0.0..=1e12, 0.0);
+    let lag = table.number_or("flow_noise_lag_s", 1e-3..=1e3, 0.15);
+    let sensor = table.optional_number("flow_sensor_noise_mm3_per_s", 0.0..=1e12);
+    let screw = table.optional_number("screw_lag_s", 0.0..=60.0);
+    Some(LinearPlant {
+        transfer,
+        unknown_input: unknown?,
+        unknown_input_per_s: unknown_per_s?,
+        flow_noise: noise?,
+        flow_noise_lag_s: lag?,
+        sensor_noise: sensor,
+        screw_lag_s: screw,
+    })
+}
+
+fn read_melt(table: &Table<'_>) -> Option<MeltPlant> {
+    let gain = table.number("gain_mm3_per_s", 1e-9..=1e12);
+    let dead_time = table.number_or("dead_time_s", 0.0..=60.0, 0.12);
+    let screw = table.number_or("screw_s", 1e-3..=60.0, 0.07);
+    let stored = table.number_or("stored_s", 1e-3..=60.0, 0.3);
+    let void = table.number_or("void_mm3", 0.0..=1e9, 650.0);
+    let void_scatter = table.number_or("void_scatter", 0.0..=1.0, 0.03);
+    let flow_scatter = table.number_or("flow_scatter", 0.0..=1.0, 0.01);
+    Some(MeltPlant {
+        gain_mm3_per_s: gain?,
+        dead_time_s: dead_time?,
+        screw_s: screw?,
+        stored_s: stored?,
+        void_mm3: void?,
+        void_scatter: void_scatter?,
+        flow_scatter: flow_scatter?,
+    })
+}
+
+fn read_pressure_plant(table: &Table<'_>) -> Option<PressurePlant> {
+    let process = read_process(table);
+    let nozzle = read_nozzle(table);
+    let fastest = table.number("fastest_rpm", 1e-6..=1e6);
+    let noise = table.number_or("sensor_noise_mpa", 0.0..=1e3, 0.0);
+    let wave = table.number_or("gain_wave_share", 0.0..=0.9, 0.0);
+    let period = table.number_or("gain_wave_period_s", 0.1..=1e6, 60.0);
+    let load = table.number_or("load_rpm", -1e6..=1e6, 0.0);
+    let load_at = table.number_or("load_at_s", 0.0..=1e6, 0.0);
+    Some(PressurePlant {
+        process: process?,
+        nozzle: nozzle?,
+        fastest: Rpm::new(fastest?).ok()?,
+        sensor_noise_mpa: noise?,
+        gain_wave: (wave?, period?),
+        load: (load?, load_at?),
+    })
+}
+
+fn read_screw_plant(table: &Table<'_>) -> Option<ScrewPlant> {
+    let screw = read_screw(table, Some(ScrewDesign::DIAGNE_2015));
+    let full = table.number("full_flow_mm3_per_s", 1e-9..=1e12);
+    let start = table.number_or("start_filled_mm", 0.0..=1e5, 100.0);
+    let noise = table.number_or("filled_noise_mm", 0.0..=1e3, 0.0);
+    let (screw, start_m) = (screw?, start? / 1000.0);
+    if start_m >= screw.length_m {
+        let found = format!("{} mm", start_m * 1000.0);
+        table.report("start_filled_mm", found, "less than length_mm");
+        return None;
+    }
+    Some(ScrewPlant {
+        screw,
+        full_flow_mm3_per_s: full?,
+        start_m,
+        before: screw.holding(start_m),
+        sensor_noise_mm: noise?,
+    })
+}

@@ -1,0 +1,243 @@
+//! The cell file: calibration, gauge, control, camera, limits, robot and
+//! recording, and for a simulated bead what it is made of. See the README for
+//! every key.
+
+mod calibration;
+mod camera;
+mod gauge;
+mod robot;
+
+use std::path::Path;
+
+use super::control;
+use super::control::{Control, WidthLaw};
+use super::extruder::Beside;
+use crate::calibration::{Calibration, SurfaceMap};
+use crate::core::frame::Channel;
+use crate::core::units::Mm;
+use crate::document::Problems;
+use crate::document::{Document, Table};
+use crate::scenario::table;
+use crate::scenario::table::{Level, Simulation};
+use crate::vision::Gauge;
+use crate::width_control::limiter::Limits;
+use crate::width_control::steps::StepSettings;
+use crate::width_control::target::Target;
+
+pub use super::extruder::ExtruderPart;
+
+pub use calibration::CalibrationSource;
+pub use camera::{Camera, Mount, Source};
+pub use robot::Robot;
+
+use calibration::read_calibration;
+use camera::{read_camera, read_mount};
+use gauge::{read_channel, read_gauge};
+use robot::read_robot;
+
+/// What a cell file is read for; keys that a purpose does not need may be
+/// absent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Purpose {
+    /// Measuring recorded frames: calibration and gauge suffice.
+    Measure,
+    /// Running or simulating the whole cell: every table is needed.
+    Run,
+}
+
+/// A cell that has been read and found sound.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell {
+    /// Where the calibration comes from.
+    pub calibration: CalibrationSource,
+    /// Height of the measured layer's top edges above the bed.
+    pub surface_height: Mm,
+    /// Standard deviation of that height.
+    pub surface_height_sigma: Mm,
+    /// Where and how the bead is measured.
+    pub gauge: Gauge,
+    /// Channel of a colour image that is measured.
+    pub channel: Channel,
+    /// Upper end of the camera's scale where it is not that of the pixels.
+    pub white: Option<u16>,
+    /// Width that is asked for, if the file says so.
+    pub target: Option<Target>,
+    /// How often frames are wanted \[Hz\], if the file says so.
+    pub frame_rate_hz: Option<f64>,
+    /// How the camera rides, if the file says so.
+    pub mount: Option<Mount>,
+    /// What is kept, and how many refused frames are bearable.
+    pub recording: Recording,
+    /// What a run needs beyond measuring; complete when read for a run.
+    pub run: Option<RunPart>,
+    /// The simulated bead, its rendering and its world.
+    pub simulation: Simulation,
+}
+
+/// What a run needs beyond measuring.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunPart {
+    /// The width controller.
+    pub control: Control,
+    /// What setpoints may be.
+    pub limits: Limits,
+    /// The camera.
+    pub camera: Camera,
+    /// The robot.
+    pub robot: Robot,
+    /// The extruder, where it is commanded.
+    pub extruder: Option<ExtruderPart>,
+}
+
+/// Which frames a recording keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KeepFrames {
+    /// None.
+    None,
+    /// Every n-th, beginning with the first; 1 is all.
+    Every(u64),
+}
+
+/// `[recording]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Recording {
+    /// Which frames are kept.
+    pub frames: KeepFrames,
+    /// Share of refused and unreadable frames above which a command ends with
+    /// status 3.
+    pub max_rejected_share: f64,
+}
+
+impl Cell {
+    /// Reads a cell from a file's text. `file` is what messages call it, and
+    /// the folder that relative paths start from.
+    pub fn parse(file: &Path, text: &str, purpose: Purpose) -> Result<Self, Problems> {
+        let name = file.display().to_string();
+        let document = Document::parse(&name, text, purpose == Purpose::Run);
+        let cell = read_cell(&document.root(), file.parent().unwrap_or(Path::new("")));
+        document.finish(cell)
+    }
+}
+
+impl Cell {
+    /// The map of the measured surface, for a camera that rides as the cell says, at
+    /// the robot's present z.
+    pub fn surface(&self, calibration: &Calibration, robot_z: Option<Mm>) -> SurfaceMap {
+        let rise = self.rise(robot_z);
+        let robot_z = robot_z.filter(|_| self.mount != Some(Mount::Fixed));
+        let map = calibration.surface(self.surface_height + rise, robot_z);
+        map.with_height_sigma(self.surface_height_sigma)
+    }
+}
+
+impl Cell {
+    /// How much higher than that of the first layer the surface is at a robot's
+    /// z, where the cell has layers: as much as the nozzle.
+    pub fn rise(&self, robot_z: Option<Mm>) -> Mm {
+        let layers = self.target.as_ref().and_then(Target::layers);
+        layers.zip(robot_z).map_or(Mm::ZERO, |(layers, z)| z - layers.first_z)
+    }
+
+    /// Whether widths are simulated without pictures.
+    pub fn simulates_widths(&self) -> bool {
+        self.run.as_ref().is_some_and(|run| run.camera.source == Source::Rendered)
+            && self.simulation.level == Level::Widths
+    }
+
+    /// Length of bead that one width is the mean of.
+    pub fn gauge_length(&self, calibration: &Calibration) -> Mm {
+        if self.simulates_widths() {
+            return self.simulation.gauge_length;
+        }
+        self.gauge.length_on(&self.surface(calibration, None)).unwrap_or_default()
+    }
+}
+
+impl Cell {
+    /// The course of steps that the cell asks for.
+    pub fn steps(&self, run: &RunPart, calibration: &Calibration) -> Option<StepSettings> {
+        let WidthLaw::Steps(share) = run.control.law else { return None };
+        Some(StepSettings {
+            start_speed: run.robot.start_speed,
+            share,
+            reach: run.camera.offset + self.gauge_length(calibration) * 0.5,
+            width_range: self.gauge.width_range,
+        })
+    }
+}
+
+fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
+    let calibration = root.required_table("calibration");
+    let calibration_source = calibration.as_ref().and_then(|t| read_calibration(t, folder));
+    let surface_height =
+        calibration.as_ref().and_then(|t| t.number_or("surface_height_mm", -1e4..=1e4, 0.0));
+    let height_sigma =
+        calibration.as_ref().and_then(|t| t.number_or("surface_height_sigma_mm", 0.0..=1e3, 0.0));
+    let gauge_table = root.required_table("gauge");
+    let gauge = gauge_table.as_ref().and_then(read_gauge);
+    let channel = gauge_table.as_ref().and_then(read_channel);
+    let bit_depth = gauge_table.as_ref().and_then(|t| t.optional_integer("bit_depth", 8..=16));
+    let recording = read_recording(root.table("recording").as_ref());
+    let control_table = root.run_table("control");
+    let width = control_table.as_ref().and_then(control::read_target);
+    let layers = root.table("layers");
+    let target =
+        control_table.as_ref().and_then(|t| control::read_course(t, layers.as_ref(), width));
+    if let (Some(table), Some(target), Some(gauge)) = (&control_table, &target, &gauge) {
+        control::check_target(table, layers.as_ref(), target, gauge.width_range);
+    }
+    let control = control_table.as_ref().and_then(|t| control::read_control(t, target.clone()));
+    let camera_table = root.run_table("camera");
+    let mount = camera_table.as_ref().and_then(read_mount);
+    let frame_rate_hz = camera_table.as_ref().and_then(|t| t.number("rate_hz", 0.01..=10_000.0));
+    let camera = camera_table.as_ref().and_then(|t| read_camera(t, folder, mount, frame_rate_hz));
+    let limits = root.run_table("limits").as_ref().and_then(control::read_limits);
+    let robot = root.run_table("robot").as_ref().and_then(|t| read_robot(t, limits));
+    if let (Some(table), Some(control), Some(limits), Some(robot)) =
+        (&control_table, &control, limits, &robot)
+    {
+        control::check_steps(table, control.law, robot.start_speed, limits);
+    }
+    let simulation = table::read(root);
+    let speed = robot.as_ref().map(|robot| robot.start_speed);
+    let bead = width.zip(speed);
+    let beside = Beside {
+        bead,
+        robot_address: robot.as_ref().map(|robot| robot.address.as_str()),
+        simulation: simulation.as_ref(),
+    };
+    let extruder = ExtruderPart::read(root, folder, &beside);
+    let run = match (control, limits, camera, robot) {
+        (Some(control), Some(limits), Some(camera), Some(robot)) => {
+            Some(RunPart { control, limits, camera, robot, extruder })
+        }
+        _ => None,
+    };
+    Some(Cell {
+        calibration: calibration_source?,
+        surface_height: Mm::new(surface_height?).ok()?,
+        surface_height_sigma: Mm::new(height_sigma?).ok()?,
+        gauge: gauge?,
+        channel: channel?,
+        white: bit_depth.and_then(|bits| u16::try_from((1u32 << bits) - 1).ok()),
+        target,
+        frame_rate_hz,
+        mount,
+        recording: recording?,
+        run,
+        simulation: simulation?,
+    })
+}
+
+fn read_recording(table: Option<&Table<'_>>) -> Option<Recording> {
+    let Some(table) = table else {
+        return Some(Recording { frames: KeepFrames::Every(1), max_rejected_share: 0.05 });
+    };
+    let every = table.integer_or("every_nth_frame", 0..=1_000_000, 1);
+    let share = table.number_or("max_rejected_share", 0.0..=1.0, 0.05);
+    let frames = match every? {
+        0 => KeepFrames::None,
+        n => KeepFrames::Every(n),
+    };
+    Some(Recording { frames, max_rejected_share: share? })
+}

@@ -1,0 +1,311 @@
+//! What an operator relies on, event by event.
+
+mod distance;
+mod extruder;
+
+use crate::control::*;
+use crate::core::time::Span;
+use crate::core::units::MmPerS2;
+use crate::width_control::RobotLimits;
+use crate::width_control::pi::PiGains;
+use crate::width_control::target::Target;
+
+/// The cell of the 2022 paper.
+pub fn setup() -> Setup {
+    Setup {
+        control: Control {
+            target: Target::constant(Mm::constant(42.0)),
+            law: WidthLaw::Pi,
+            gains: Some(PiGains { kp_per_s: 5.925, ki_per_s2: 4.74 }),
+            max_gap: Span::from_secs(0.5),
+            max_hold: Span::from_secs(3.0),
+        },
+        limits: Limits {
+            min_speed: MmPerS::constant(60.0),
+            max_speed: MmPerS::constant(150.0),
+            max_accel: MmPerS2::constant(2000.0),
+        },
+        start_speed: MmPerS::constant(112.5),
+        bead_length: None,
+        start_length: Mm::constant(200.0),
+        camera_offset: Mm::constant(88.4),
+        alone_for: Span::from_millis(1600),
+        setpoint_period: Span::from_millis(200),
+        distance: None,
+        steps: None,
+    }
+}
+
+/// A cell on a time line: a robot that reports, a camera that sees.
+struct Line {
+    controller: Controller,
+    now: f64,
+    frame: u64,
+}
+
+impl Line {
+    fn new() -> Self {
+        Self::of(setup())
+    }
+
+    /// A cell with its link up.
+    fn of(setup: Setup) -> Self {
+        let mut line = Self { controller: Controller::new(setup), now: 0.0, frame: 0 };
+        let robot = RobotLimits {
+            name: "sim".into(),
+            min_mm_per_s: MmPerS::constant(10.0),
+            max_mm_per_s: MmPerS::constant(200.0),
+            hold_mm_per_s: MmPerS::constant(80.0),
+        };
+        let _ = line.give(&Event::LinkUp { robot });
+        line
+    }
+
+    fn give(&mut self, event: &Event) -> Step {
+        self.controller.step(Stamp::from_secs(self.now), event)
+    }
+
+    fn robot(&mut self, mode: RobotMode, path: f64, speed: f64) -> Step {
+        self.give(&Event::Robot(RobotState {
+            t_ms: 0,
+            seq: 1,
+            mode,
+            speed_mm_per_s: MmPerS::constant(speed),
+            path_mm: Mm::constant(path),
+            z_mm: Mm::ZERO,
+        }))
+    }
+
+    fn width(&mut self, width: f64) -> Step {
+        self.frame += 1;
+        self.give(&Event::Measured {
+            frame: self.frame,
+            captured_at: Stamp::from_secs(self.now),
+            width_mm: Mm::constant(width),
+            sigma_mm: Mm::constant(0.01),
+        })
+    }
+
+    fn tick(&mut self) -> Option<f64> {
+        match self.give(&Event::Tick).command {
+            Some(Command::Speed(speed)) => Some(speed.get()),
+            _ => None,
+        }
+    }
+
+    /// Lays bead until the controller tracks a width that is right.
+    fn tracking() -> Self {
+        let mut line = Self::new();
+        line.now = 1.0;
+        let _ = line.robot(RobotMode::Print, 0.0, 112.5);
+        line.now = 3.0;
+        let _ = line.robot(RobotMode::Print, 225.0, 112.5);
+        let _ = line.tick();
+        assert_eq!(line.width(42.0).state, State::Tracking);
+        line
+    }
+
+    fn advance(&mut self, secs: f64, path: f64, speed: f64) -> Step {
+        self.now += secs;
+        self.robot(RobotMode::Print, path, speed)
+    }
+}
+
+#[test]
+fn nothing_is_sent_to_a_robot_that_does_not_print() {
+    let mut line = Line::new();
+    assert_eq!(line.tick(), None);
+    let _ = line.robot(RobotMode::Idle, 0.0, 0.0);
+    assert_eq!(line.tick(), None);
+    assert_eq!(line.width(30.0).state, State::Idle);
+}
+
+#[test]
+fn the_first_stretch_is_laid_at_the_start_speed_whatever_the_width() {
+    let mut line = Line::new();
+    line.now = 1.0;
+    let _ = line.robot(RobotMode::Print, 0.0, 112.5);
+    assert_eq!(line.width(30.0).state, State::Priming);
+    assert_eq!(line.tick(), Some(112.5));
+    line.now = 2.7;
+    let _ = line.robot(RobotMode::Print, 191.0, 112.5);
+    assert_eq!(line.width(30.0).state, State::Priming);
+    assert_eq!(line.tick(), Some(112.5));
+}
+
+#[test]
+fn tracking_begins_without_a_bump_and_answers_too_wide_with_speed() {
+    let mut line = Line::tracking();
+    assert!((line.tick().unwrap() - 112.5).abs() < 1e-9);
+    let _ = line.advance(0.1, 236.0, 112.5);
+    let step = line.width(43.0);
+    let demand = step.trace.demand_mm_per_s.unwrap().get();
+    assert!((demand - (112.5 + 5.925 + 0.474)).abs() < 1e-9);
+    let bead = step.trace.bead_path_mm.unwrap().get();
+    assert!((bead - (236.0 - 88.4)).abs() < 1e-9);
+}
+
+#[test]
+fn a_gap_is_held_and_not_integrated_across() {
+    let mut line = Line::tracking();
+    let _ = line.advance(0.1, 236.0, 112.5);
+    let _ = line.width(42.5);
+    let before = line.tick().unwrap();
+    let _ = line.advance(0.6, 300.0, before);
+    assert_eq!(line.tick(), Some(before));
+    assert_eq!(line.controller.state(), State::Holding(Hold::NoWidth));
+    let step = line.width(44.0);
+    assert_eq!(step.state, State::Tracking);
+    assert!((step.trace.demand_mm_per_s.unwrap().get() - before).abs() < 1e-9);
+}
+
+#[test]
+fn a_hold_without_end_becomes_a_fault_that_stops_the_robot() {
+    let mut line = Line::tracking();
+    let speed = line.tick().unwrap();
+    for k in 1..=50 {
+        let _ = line.advance(0.1, 225.0 + f64::from(k) * 11.25, speed);
+        let _ = line.tick();
+    }
+    let held = Fault::HeldTooLong(Hold::NoWidth);
+    assert_eq!(line.controller.state(), State::Fault(held));
+    assert_eq!(line.give(&Event::Tick).command, Some(Command::Stop));
+    assert_eq!(line.robot(RobotMode::Idle, 0.0, 0.0).state, State::Idle);
+}
+
+#[test]
+fn a_robot_that_does_not_follow_is_held_and_then_stopped() {
+    let mut line = Line::tracking();
+    let _ = line.tick();
+    let _ = line.advance(0.1, 230.0, 90.0);
+    let _ = line.advance(0.55, 280.0, 90.0);
+    assert_eq!(line.controller.state(), State::Holding(Hold::SpeedMismatch));
+    let _ = line.advance(1.5, 400.0, 90.0);
+    assert_eq!(line.controller.state(), State::Fault(Fault::SpeedMismatch));
+}
+
+#[test]
+fn the_integral_waits_while_the_robot_is_slower_than_told() {
+    let mut line = Line::tracking();
+    let _ = line.tick();
+    let _ = line.advance(0.1, 236.0, 106.0);
+    let _ = line.width(42.0);
+    let _ = line.advance(0.35, 273.0, 106.0);
+    let before = line.width(42.0).trace.integral_mm_per_s.unwrap();
+    let _ = line.advance(0.1, 284.0, 106.0);
+    let step = line.width(44.0);
+    assert_eq!(step.trace.integral_mm_per_s.unwrap(), before);
+    let _ = line.tick();
+    assert_eq!(line.width(44.0).trace.limit, Limit::RobotSlower);
+}
+
+#[test]
+fn a_lost_link_is_a_hold_that_ends_with_the_link() {
+    let mut line = Line::tracking();
+    let _ = line.tick();
+    let step = line.give(&Event::LinkDown { reason: "no STATE for 500 ms".into() });
+    assert_eq!(step.state, State::Holding(Hold::LinkDown));
+    assert_eq!(line.tick(), None);
+    let robot = RobotLimits {
+        name: "sim".into(),
+        min_mm_per_s: MmPerS::constant(10.0),
+        max_mm_per_s: MmPerS::constant(200.0),
+        hold_mm_per_s: MmPerS::constant(80.0),
+    };
+    line.now += 0.3;
+    let _ = line.give(&Event::LinkUp { robot });
+    let _ = line.advance(0.1, 270.0, 80.0);
+    let step = line.width(42.0);
+    assert_eq!(step.state, State::Tracking);
+    assert!((step.trace.demand_mm_per_s.unwrap().get() - 80.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_robot_with_narrower_limits_is_never_driven() {
+    let mut line = Line::new();
+    let robot = RobotLimits {
+        name: "slow".into(),
+        min_mm_per_s: MmPerS::constant(10.0),
+        max_mm_per_s: MmPerS::constant(100.0),
+        hold_mm_per_s: MmPerS::constant(80.0),
+    };
+    let step = line.give(&Event::LinkUp { robot });
+    assert_eq!(step.state, State::Holding(Hold::RobotLimits));
+    let _ = line.robot(RobotMode::Print, 0.0, 80.0);
+    assert_eq!(line.tick(), None);
+}
+
+#[test]
+fn what_cannot_be_recorded_ends_control_in_hold() {
+    let mut line = Line::tracking();
+    let step = line.give(&Event::RecordingLost);
+    assert_eq!(step.state, State::Holding(Hold::RecordingLost));
+    let _ = line.advance(0.1, 236.0, 112.5);
+    assert_eq!(line.width(50.0).state, State::Holding(Hold::RecordingLost));
+    assert_eq!(line.tick(), None);
+    let step = line.give(&Event::Stop);
+    assert_eq!(step.command, Some(Command::Stop));
+}
+
+#[test]
+fn a_width_of_the_last_bead_does_not_start_control_of_this_one() {
+    let mut line = Line::new();
+    line.controller.setup.start_length = Mm::constant(20.0);
+    line.now = 1.0;
+    let _ = line.robot(RobotMode::Print, 500.0, 112.5);
+    line.now = 1.4;
+    let _ = line.robot(RobotMode::Print, 545.0, 112.5);
+    assert_eq!(line.width(42.0).state, State::Priming);
+    line.now = 1.9;
+    let _ = line.robot(RobotMode::Print, 600.0, 112.5);
+    assert_eq!(line.width(42.0).state, State::Tracking);
+}
+
+#[test]
+fn a_bead_of_which_no_width_comes_is_held_and_given_up() {
+    let mut line = Line::new();
+    let _ = line.robot(RobotMode::Print, 0.0, 112.5);
+    let mut states = Vec::new();
+    let mut path = 0.0;
+    for _ in 0..80 {
+        path += 11.25;
+        let _ = line.advance(0.1, path, 112.5);
+        let _ = line.tick();
+        states.push((path, line.controller.state()));
+    }
+    let first = |state: &State| states.iter().find(|(_, found)| found == state).map(|one| one.0);
+    let held = first(&State::Holding(Hold::NoWidth)).unwrap();
+    // 200 mm at the start speed, 88.4 mm to the camera, and half a second.
+    assert!((340.0..370.0).contains(&held), "{held}");
+    assert!(first(&State::Fault(Fault::HeldTooLong(Hold::NoWidth))).is_some());
+}
+
+#[test]
+fn a_camera_that_was_lost_while_the_robot_held_is_not_forgotten() {
+    let mut line = Line::new();
+    let _ = line.robot(RobotMode::Print, 0.0, 112.5);
+    let _ = line.advance(0.5, 56.0, 112.5);
+    let _ = line.robot(RobotMode::Hold, 56.0, 0.0);
+    let _ = line.give(&Event::CameraLost { reason: "unplugged".into() });
+    let state = line.advance(0.1, 57.0, 112.5).state;
+    assert_eq!(state, State::Holding(Hold::CameraLost));
+}
+
+#[test]
+fn a_path_that_jitters_is_no_new_bead_and_one_in_a_fault_stays_in_it() {
+    let mut line = Line::tracking();
+    assert_eq!(line.advance(0.1, 236.0, 112.5).state, State::Tracking);
+    assert_eq!(line.advance(0.1, 235.9, 112.5).state, State::Tracking);
+    let _ = line.robot(RobotMode::Fault, 240.0, 0.0);
+    assert_eq!(line.advance(0.1, 5.0, 112.5).state, State::Fault(Fault::Robot));
+    let _ = line.robot(RobotMode::Idle, 5.0, 0.0);
+    assert_eq!(line.advance(0.1, 6.0, 112.5).state, State::Priming);
+}
+
+#[test]
+fn a_new_bead_that_is_first_heard_in_hold_is_a_new_one() {
+    let mut line = Line::tracking();
+    let _ = line.advance(0.1, 500.0, 112.5);
+    let _ = line.robot(RobotMode::Hold, 60.0, 0.0);
+    assert_eq!(line.advance(0.1, 65.0, 112.5).state, State::Priming);
+}

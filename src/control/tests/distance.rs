@@ -1,0 +1,135 @@
+//! The width held by distance, event by event.
+
+use crate::control::tests::*;
+use crate::width_control::distance::{DistanceSettings, Distrust};
+use crate::width_control::target::Knot;
+
+const STEP_S: f64 = 0.05;
+
+/// The 2022 paper's cell, held by distance.
+fn by_distance() -> Setup {
+    let told = DistanceSettings {
+        offset: Mm::constant(88.4),
+        offset_sigma: Mm::constant(8.84),
+        gauge: Mm::constant(12.7),
+        reference_speed: MmPerS::constant(112.5),
+        exponent: 0.25,
+        learns_exponent: true,
+        drift_per_root_m: 0.0055,
+    };
+    Setup { distance: Some(told), setpoint_period: Span::from_secs(STEP_S), ..setup() }
+}
+
+/// A robot that does at once what it is told, over a bead of b = 0.25.
+struct Cell {
+    line: Line,
+    path: f64,
+    speed: f64,
+    /// Place and width, as it was laid.
+    laid: Vec<(f64, f64)>,
+    /// Whether the robot says how far it has come.
+    tells_path: bool,
+}
+
+impl Cell {
+    fn new(setup: Setup) -> Self {
+        let line = Line::of(setup);
+        let mut cell = Self { line, path: 0.0, speed: 112.5, laid: Vec::new(), tells_path: true };
+        let _ = cell.line.robot(RobotMode::Print, 0.0, 112.5);
+        cell
+    }
+
+    fn width_at(speed: f64) -> f64 {
+        38.61 * (speed / 112.5).powf(-0.25)
+    }
+
+    /// One step of time: lay, report, see, and be told a speed.
+    fn step(&mut self) -> Step {
+        self.laid.push((self.path, Self::width_at(self.speed)));
+        self.path += self.speed * STEP_S;
+        self.line.now += STEP_S;
+        let told = if self.tells_path { self.path } else { 0.0 };
+        let _ = self.line.robot(RobotMode::Print, told, self.speed);
+        let under = self.path - 88.4;
+        let seen = self.laid.iter().rev().find(|(at, _)| *at <= under).map(|(_, width)| *width);
+        let step = seen.map(|width| self.line.width(width)).unwrap_or_default();
+        if let Some(speed) = self.line.tick() {
+            self.speed = speed;
+        }
+        step
+    }
+
+    fn until(&mut self, path: f64) -> Step {
+        let mut step = Step::default();
+        while self.path < path {
+            step = self.step();
+        }
+        step
+    }
+}
+
+#[test]
+fn the_first_setpoint_after_the_start_is_that_of_the_wanted_width() {
+    let mut cell = Cell::new(by_distance());
+    let _ = cell.until(190.0);
+    assert!((cell.speed - 112.5).abs() < 1e-9);
+    let _ = cell.until(212.0);
+    assert_eq!(cell.line.controller.state(), State::Tracking);
+    let wanted = 112.5 * (38.61_f64 / 42.0).powf(4.0);
+    assert!((cell.speed - wanted).abs() < 0.5, "{} {wanted}", cell.speed);
+}
+
+#[test]
+fn a_step_of_the_target_is_driven_where_it_is_wanted() {
+    let mut setup = by_distance();
+    let knot = |path, width| Knot { path: Mm::constant(path), width: Mm::constant(width) };
+    let knots = vec![knot(400.0, 42.0), knot(400.0, 40.0)];
+    setup.control.target = Target::constant(Mm::constant(42.0)).along(knots);
+    let mut cell = Cell::new(setup);
+    let _ = cell.until(390.0);
+    assert!((Cell::width_at(cell.speed) - 42.0).abs() < 0.2);
+    let _ = cell.until(406.0);
+    assert!((Cell::width_at(cell.speed) - 40.0).abs() < 0.2, "{}", cell.speed);
+    let step = cell.until(520.0);
+    assert!(step.trace.error_mm.unwrap().get().abs() < 0.3, "{step:?}");
+}
+
+#[test]
+fn a_robot_that_tells_no_path_is_held_by_the_pi_law_and_the_record_says_why() {
+    let mut cell = Cell::new(by_distance());
+    cell.tells_path = false;
+    let step = cell.until(600.0);
+    assert_eq!(step.trace.fallback, Some(Distrust::NoPath));
+    assert!(step.trace.integral_mm_per_s.is_some(), "{step:?}");
+    assert_eq!(cell.line.controller.state(), State::Tracking);
+}
+
+#[test]
+fn another_bead_is_held_from_its_first_millimetre_by_what_the_last_one_taught() {
+    let mut setup = by_distance();
+    setup.start_length = Mm::ZERO;
+    let mut cell = Cell::new(setup);
+    let _ = cell.until(500.0);
+    let _ = cell.line.robot(RobotMode::Idle, 500.0, 0.0);
+    cell.line.now += 5.0;
+    let _ = cell.line.robot(RobotMode::Print, 500.0, 112.5);
+    let speed = cell.line.tick().unwrap();
+    assert!((Cell::width_at(speed) - 42.0).abs() < 0.1, "{speed}");
+}
+
+#[test]
+fn a_bead_that_does_not_fill_the_gauge_yet_is_waited_for() {
+    let mut setup = by_distance();
+    setup.start_length = Mm::ZERO;
+    let mut line = Line::of(setup);
+    line.now = 1.0;
+    let _ = line.robot(RobotMode::Print, 0.0, 112.5);
+    line.now = 1.8;
+    let _ = line.robot(RobotMode::Print, 90.0, 112.5);
+    let step = line.width(38.6);
+    assert_eq!((step.state, step.trace.integral_mm_per_s), (State::Priming, None));
+    line.now = 2.0;
+    let _ = line.robot(RobotMode::Print, 112.5, 112.5);
+    let step = line.width(38.6);
+    assert_eq!((step.state, step.trace.integral_mm_per_s), (State::Tracking, None));
+}

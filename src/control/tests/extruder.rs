@@ -1,0 +1,336 @@
+//! The extruder side through the controller: a link that goes and comes, and
+//! bead after bead.
+
+use crate::control::tests::*;
+use crate::core::units::{Mm2, Rpm};
+use crate::extruder::law::{Constant, Played};
+use crate::extruder::{
+    CommandLimits, Drive, ExtruderCommand, ExtruderFault, ExtruderHold, ExtruderReport,
+    ExtruderState, Follows, Law, PumpMode, RobotFollows,
+};
+use crate::identify::profile::{Point, Profile};
+
+const TICK_S: f64 = 0.005;
+const SPEED: f64 = 112.5;
+
+fn rig(law: Law) -> (ExtruderSetup, FlowDemand) {
+    let setup = ExtruderSetup {
+        drive: Drive::Rpm,
+        law,
+        limits: CommandLimits::new(0.0, 60.0, 400.0).unwrap(),
+        feedforward_period: Span::from_secs(TICK_S),
+        control_period: Span::from_millis(50),
+        io_period: Span::from_millis(20),
+        max_gap: Span::from_millis(200),
+        max_hold: Span::from_secs(1.0),
+        max_pressure: None,
+        filters: crate::extruder::ReadingFilters::default(),
+        robot_follows: RobotFollows::Nothing,
+        timing: None,
+        plan: None,
+    };
+    let demand = FlowDemand::new(Mm2::constant(10.0), MmPerS::constant(SPEED), Follows::Robot);
+    (setup, demand)
+}
+
+/// A robot that prints or stands, and an extruder that does what it is told.
+struct Cell {
+    line: Line,
+    mode: RobotMode,
+    path: f64,
+    ticks: u32,
+    link: bool,
+    told: Option<ExtruderCommand>,
+    sent: Vec<(f64, ExtruderCommand)>,
+}
+
+impl Cell {
+    fn new(law: Law) -> Self {
+        let mut line = Line::new();
+        let (setup, demand) = rig(law);
+        line.controller = line.controller.with_extruder(setup, demand);
+        let mut cell = Self {
+            line,
+            mode: RobotMode::Idle,
+            path: 0.0,
+            ticks: 0,
+            link: false,
+            told: None,
+            sent: Vec::new(),
+        };
+        cell.link(true);
+        cell
+    }
+
+    fn link(&mut self, up: bool) {
+        self.link = up;
+        let down = Event::ExtruderDown { reason: "no STATE for 500 ms".into() };
+        let event = if up { Event::ExtruderUp } else { down };
+        assert!(self.line.give(&event).extruder.unwrap().command.is_none());
+    }
+
+    /// Lets time pass; gives the state of the extruder side.
+    fn go(&mut self, secs: f64) -> ExtruderState {
+        let until = self.line.now + secs - 1e-9;
+        let mut state = ExtruderState::Off;
+        while self.line.now < until {
+            if self.ticks.is_multiple_of(4) {
+                let speed = if self.mode == RobotMode::Print { SPEED } else { 0.0 };
+                let _ = self.line.robot(self.mode, self.path, speed);
+                if self.link {
+                    let report = self.report();
+                    let _ = self.line.give(&Event::Extruder(report));
+                }
+            }
+            let side = self.line.give(&Event::ExtruderTick).extruder.unwrap();
+            state = side.state;
+            if let Some(command) = side.command {
+                assert!(self.link, "a command without a link");
+                self.told = Some(command);
+                self.sent.push((self.line.now, command));
+            }
+            self.ticks += 1;
+            self.line.now += TICK_S;
+            if self.mode == RobotMode::Print {
+                self.path += SPEED * TICK_S;
+            }
+        }
+        state
+    }
+
+    fn report(&self) -> ExtruderReport {
+        let on = self.told.filter(|told| told.pump_on);
+        ExtruderReport {
+            pump: if on.is_some() { PumpMode::On } else { PumpMode::Off },
+            valve_open: self.told.is_some_and(|told| told.valve_open),
+            screw_rpm: Rpm::new(on.map_or(0.0, |told| told.value)).ok(),
+            pressure_mpa: None,
+            flow_mm3_per_s: None,
+            filled_mm: None,
+        }
+    }
+
+    fn last(&self) -> ExtruderCommand {
+        self.told.unwrap()
+    }
+}
+
+#[test]
+fn a_lost_extruder_is_held_while_the_robot_goes_on() {
+    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    cell.mode = RobotMode::Print;
+    assert_eq!(cell.go(1.0), ExtruderState::Running);
+    cell.link(false);
+    assert_eq!(cell.go(0.8), ExtruderState::Holding(ExtruderHold::LinkDown));
+    assert_eq!(cell.line.tick(), Some(SPEED));
+    cell.link(true);
+    assert_eq!(cell.go(0.2), ExtruderState::Running);
+    assert_eq!(cell.last(), ExtruderCommand { pump_on: true, valve_open: true, value: 30.0 });
+}
+
+#[test]
+fn a_pump_does_not_outlast_a_robot_that_nobody_hears() {
+    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    cell.mode = RobotMode::Print;
+    assert_eq!(cell.go(1.0), ExtruderState::Running);
+    let _ = cell.line.give(&Event::LinkDown { reason: "no STATE for 500 ms".into() });
+    let mut state = ExtruderState::Running;
+    for _ in 0..340 {
+        assert!(cell.last().pump_on || cell.line.now > 1.0 + 1.59);
+        let report = cell.report();
+        let _ = cell.line.give(&Event::Extruder(report));
+        let side = cell.line.give(&Event::ExtruderTick).extruder.unwrap();
+        state = side.state;
+        cell.told = side.command.or(cell.told);
+        cell.line.now += TICK_S;
+    }
+    assert_eq!(state, ExtruderState::Off);
+    assert!(!cell.last().pump_on && !cell.last().valve_open);
+}
+
+#[test]
+fn an_extruder_that_stays_away_stops_the_robot_and_is_stopped_when_it_comes_back() {
+    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    cell.mode = RobotMode::Print;
+    let _ = cell.go(1.0);
+    cell.link(false);
+    let fault = ExtruderFault::HeldTooLong(ExtruderHold::LinkDown);
+    assert_eq!(cell.go(1.1), ExtruderState::Fault(fault));
+    assert_eq!(cell.line.controller.state(), State::Fault(Fault::Extruder(fault)));
+    assert_eq!(cell.line.give(&Event::Tick).command, Some(Command::Stop));
+    cell.link(true);
+    assert_eq!(cell.go(0.1), ExtruderState::Fault(fault));
+    assert!(!cell.last().pump_on && !cell.last().valve_open);
+    // The robot's idleness ends the fault on both sides.
+    cell.mode = RobotMode::Idle;
+    assert_eq!(cell.go(0.1), ExtruderState::Off);
+    (cell.mode, cell.path) = (RobotMode::Print, 0.0);
+    assert_eq!(cell.go(0.5), ExtruderState::Running);
+}
+
+#[test]
+fn every_bead_begins_anew() {
+    let at = |from_s, value| Point { from_s, value };
+    let profile = Profile::new(vec![at(0.0, 20.0), at(0.5, 50.0)], 2.0).unwrap();
+    let mut cell = Cell::new(Law::Profile(Played::new(profile)));
+    for _ in 0..3 {
+        (cell.mode, cell.path) = (RobotMode::Print, 0.0);
+        let sent = cell.sent.len();
+        assert_eq!(cell.go(1.0), ExtruderState::Running);
+        assert_eq!(cell.sent[sent].1.value, 20.0);
+        assert_eq!(cell.last().value, 50.0);
+        cell.mode = RobotMode::Idle;
+        assert_eq!(cell.go(0.5), ExtruderState::Off);
+        assert_eq!(cell.last(), ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 });
+    }
+}
+
+#[test]
+fn a_bead_right_behind_another_keeps_the_pump_running() {
+    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    cell.mode = RobotMode::Print;
+    let _ = cell.go(1.0);
+    let sent = cell.sent.len();
+    cell.path = 0.0;
+    assert_eq!(cell.go(1.0), ExtruderState::Running);
+    assert!(cell.sent[sent..].iter().all(|(_, command)| command.pump_on));
+}
+
+/// A bead of 1 m and one of 500 mm, both half as fast from the middle of the longer one on.
+const PLAN: &str = "\
+bead,time_s,path_mm,speed_mm_per_s,command_rpm,flow_mm3_per_s
+1,0,0,112.5,30,1125
+1,4.4,495,112.5,30,1125
+1,4.5,503.4375,56.25,15,562.5
+1,13.3277778,1000,56.25,15,562.5
+2,0,0,112.5,30,1125
+2,4.44444,500,112.5,30,1125
+";
+
+fn planned() -> Cell {
+    let (setup, demand) = rig(Law::Constant(Constant(30.0)));
+    let plan =
+        Some(std::sync::Arc::new(crate::extruder::trajectory::PlannedJob::parse(PLAN).unwrap()));
+    let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+    // The test puts the robot elsewhere, which no real one does: its speed jumps, too.
+    let limits = Limits {
+        min_speed: MmPerS::constant(10.0),
+        max_accel: MmPerS2::constant(1e5),
+        ..super::setup().limits
+    };
+    cell.line = Line::of(Setup { limits, ..super::setup() });
+    cell.line.controller =
+        cell.line.controller.with_extruder(ExtruderSetup { plan, ..setup }, demand);
+    cell.mode = RobotMode::Print;
+    cell
+}
+
+#[test]
+fn a_hold_goes_on_with_the_plan_and_keeps_the_width_controllers_part() {
+    let mut cell = planned();
+    let _ = cell.go(2.0);
+    // Too wide, which the controller answers with more speed.
+    let mut asked = cell.line.tick().unwrap();
+    for _ in 0..6 {
+        let _ = cell.line.width(46.0);
+        asked = cell.line.tick().unwrap();
+        let _ = cell.go(0.05);
+    }
+    assert!(asked > SPEED * 1.03, "{asked}");
+    let lost = Event::CameraLost { reason: "unplugged".into() };
+    assert!(matches!(cell.line.give(&lost).state, State::Holding(_)));
+    let held = cell.line.tick().unwrap();
+    assert!((held / asked - 1.0).abs() < 1e-6, "{held} after {asked}");
+    // Behind the plan's step, still held.
+    cell.path = 550.0;
+    let _ = cell.go(0.02);
+    let slowed = cell.line.tick().unwrap();
+    assert!(matches!(cell.line.controller.state(), State::Holding(_)));
+    assert!((slowed / (asked / 2.0) - 1.0).abs() < 1e-6, "{slowed} after {asked}");
+}
+
+#[test]
+fn a_bead_that_was_broken_off_is_planned_again_and_one_that_was_laid_is_not() {
+    let mut cell = planned();
+    let halfway = |cell: &mut Cell| {
+        (cell.mode, cell.path) = (RobotMode::Print, 0.0);
+        let _ = cell.go(0.02);
+        cell.path = 600.0;
+        let _ = cell.go(0.02);
+        cell.line.tick().unwrap()
+    };
+    let rest = |cell: &mut Cell| {
+        cell.mode = RobotMode::Idle;
+        let _ = cell.go(0.1);
+    };
+    for _ in 0..2 {
+        assert!((halfway(&mut cell) - SPEED / 2.0).abs() < 1e-3);
+        rest(&mut cell);
+    }
+    let _ = halfway(&mut cell);
+    cell.path = 995.0;
+    let _ = cell.go(0.02);
+    rest(&mut cell);
+    // The second bead's plan is at its end there, and slows down nowhere.
+    assert!((halfway(&mut cell) - SPEED).abs() < 1e-3);
+}
+
+#[test]
+fn a_bead_that_begins_while_the_link_is_down_is_the_next_of_the_plan() {
+    let mut cell = planned();
+    cell.path = 995.0;
+    let _ = cell.go(0.02);
+    // As it would be had the bead begun at 0.
+    cell.mode = RobotMode::Idle;
+    let _ = cell.go(0.02);
+    (cell.mode, cell.path) = (RobotMode::Print, 0.0);
+    let _ = cell.go(0.02);
+    cell.path = 995.0;
+    let _ = cell.go(0.02);
+    assert!((cell.line.tick().unwrap() - SPEED / 2.0).abs() < 1e-3);
+    let _ = cell.line.give(&Event::LinkDown { reason: "no STATE for 500 ms".into() });
+    cell.line.now += 1.0;
+    let robot = RobotLimits {
+        name: "sim".into(),
+        min_mm_per_s: MmPerS::constant(10.0),
+        max_mm_per_s: MmPerS::constant(200.0),
+        hold_mm_per_s: MmPerS::constant(80.0),
+    };
+    let _ = cell.line.give(&Event::LinkUp { robot });
+    cell.path = 20.0;
+    let _ = cell.go(0.02);
+    cell.path = 600.0;
+    let _ = cell.go(0.02);
+    // The second bead's plan slows down nowhere.
+    assert!((cell.line.tick().unwrap() - SPEED).abs() < 1e-3);
+}
+
+#[test]
+fn a_pump_goes_by_when_the_robot_was_last_heard_whatever_was_held_before() {
+    // Held for a lost camera when the link goes, and for want of widths long before it.
+    for lost_before in [Some(Event::CameraLost { reason: "unplugged".into() }), None] {
+        let mut cell = Cell::new(Law::Constant(Constant(30.0)));
+        cell.mode = RobotMode::Print;
+        assert_eq!(cell.go(2.0), ExtruderState::Running);
+        let _ = cell.line.width(42.0);
+        if let Some(lost) = &lost_before {
+            let _ = cell.line.give(lost);
+        }
+        let _ = cell.line.tick();
+        let _ = cell.go(2.0);
+        let _ = cell.line.tick();
+        assert!(matches!(cell.line.controller.state(), State::Holding(_)));
+        let _ = cell.line.give(&Event::LinkDown { reason: "no STATE for 500 ms".into() });
+        let gone = cell.line.now;
+        while cell.line.now < gone + 1.7 {
+            let report = cell.report();
+            let _ = cell.line.give(&Event::Extruder(report));
+            let side = cell.line.give(&Event::ExtruderTick).extruder.unwrap();
+            cell.told = side.command.or(cell.told);
+            let alone_s = cell.line.now - gone;
+            assert!(cell.last().pump_on || alone_s > 1.55, "{lost_before:?}: {alone_s}");
+            cell.line.now += TICK_S;
+        }
+        assert!(!cell.last().pump_on, "{lost_before:?}");
+    }
+}

@@ -1,0 +1,112 @@
+//! Whether the robot moves, or a screw turns, at the speed that it was told.
+
+use super::time::{Span, Stamp};
+use super::units::MmPerS;
+
+/// Time that the speed of a robot takes to follow, unless its own is known: one over the
+/// angular frequency of a loop of 10 Hz, as the 2022 paper has it.
+pub const ROBOT_LAG: Span = Span::from_millis(16);
+/// Share of the setpoint by which the speed may differ.
+const TOLERANCE: f64 = 0.10;
+/// Share from which the robot counts as held by limits of its own.
+const LIMITED: f64 = 0.03;
+/// How long a difference may last before it is believed to be a limit.
+const LIMITED_AFTER: Span = Span::from_millis(300);
+/// How long it may last before the controller holds.
+const HOLD_AFTER: Span = Span::from_millis(500);
+/// How long before it gives up.
+const FAULT_AFTER: Span = Span::from_millis(2000);
+
+/// Watches the speed that is read back.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Follow {
+    slower: Option<Stamp>,
+    faster: Option<Stamp>,
+    outside: Option<Stamp>,
+}
+
+/// What the speed read back says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Verdict {
+    /// The robot does as it is told.
+    #[default]
+    Follows,
+    /// It has moved slower for a while: a limit of its own.
+    Slower,
+    /// It has moved faster for a while.
+    Faster,
+    /// It has been more than a tenth off for long enough to hold.
+    Mismatch,
+    /// It has been more than a tenth off for long enough to give up.
+    Lost,
+}
+
+impl Follow {
+    /// Compares a report with the setpoint that it should follow.
+    pub fn observe(&mut self, now: Stamp, told: MmPerS, driven: MmPerS) -> Verdict {
+        self.observe_share(now, driven.get(), told.get())
+    }
+
+    /// The same for a speed of any unit; below 1 of it a difference counts as
+    /// if it were one of 1.
+    pub fn observe_share(&mut self, now: Stamp, driven: f64, told: f64) -> Verdict {
+        let share = (driven - told) / told.max(1.0);
+        mark(&mut self.slower, now, share < -LIMITED);
+        mark(&mut self.faster, now, share > LIMITED);
+        mark(&mut self.outside, now, share.abs() > TOLERANCE);
+        let lasts = |since: Option<Stamp>, span: Span| since.is_some_and(|at| now - at > span);
+        if lasts(self.outside, FAULT_AFTER) {
+            Verdict::Lost
+        } else if lasts(self.outside, HOLD_AFTER) {
+            Verdict::Mismatch
+        } else if lasts(self.slower, LIMITED_AFTER) {
+            Verdict::Slower
+        } else if lasts(self.faster, LIMITED_AFTER) {
+            Verdict::Faster
+        } else {
+            Verdict::Follows
+        }
+    }
+
+    /// Forgets what was, as when the robot has not been told anything.
+    pub fn reset(&mut self) {
+        *self = Self::default();
+    }
+}
+
+fn mark(since: &mut Option<Stamp>, now: Stamp, lasts: bool) {
+    *since = if lasts { since.or(Some(now)) } else { None };
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::core::readback::*;
+
+    fn after(secs: f64, driven: f64) -> Verdict {
+        let mut follow = Follow::default();
+        let told = MmPerS::constant(100.0);
+        let _ = follow.observe(Stamp::START, told, MmPerS::constant(driven));
+        follow.observe(Stamp::from_secs(secs), told, MmPerS::constant(driven))
+    }
+
+    #[test]
+    fn a_difference_must_last_to_count() {
+        assert_eq!(after(0.2, 80.0), Verdict::Follows);
+        assert_eq!(after(0.4, 80.0), Verdict::Slower);
+        assert_eq!(after(0.4, 120.0), Verdict::Faster);
+        assert_eq!(after(0.6, 80.0), Verdict::Mismatch);
+        assert_eq!(after(2.1, 80.0), Verdict::Lost);
+        assert_eq!(after(9.0, 101.0), Verdict::Follows);
+    }
+
+    #[test]
+    fn a_report_in_between_that_agrees_starts_the_count_again() {
+        let mut follow = Follow::default();
+        let told = MmPerS::constant(100.0);
+        for (secs, driven) in [(0.0, 80.0), (0.4, 100.0), (0.45, 80.0)] {
+            let _ = follow.observe(Stamp::from_secs(secs), told, MmPerS::constant(driven));
+        }
+        let verdict = follow.observe(Stamp::from_secs(0.6), told, MmPerS::constant(80.0));
+        assert_eq!(verdict, Verdict::Follows);
+    }
+}

@@ -1,0 +1,6 @@
+//! Cameras, robots and extruders on the other side of a device, a file or a socket.
+
+pub mod camera;
+pub mod extruder;
+pub mod line;
+pub mod robot;

@@ -1,0 +1,58 @@
+//! How high the nozzle was, from the robot states in a recording.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::core::time::Stamp;
+use crate::core::units::Mm;
+use crate::width_control::Event;
+
+/// Heights over time. Copies share what they know, so that one can be asked
+/// while another is being filled.
+#[derive(Debug, Clone, Default)]
+pub struct RobotZ(Arc<Mutex<Vec<(Stamp, Mm)>>>);
+
+impl RobotZ {
+    /// Notes the height where an event tells one.
+    pub fn note(&self, now: Stamp, event: &Event) {
+        let Event::Robot(state) = event else { return };
+        let mut heights = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if heights.last().is_none_or(|&(_, z)| z != state.z_mm) {
+            heights.push((now, state.z_mm));
+        }
+    }
+
+    /// Height of the nozzle in the robot's frame as the newest state at that
+    /// moment had it, which is what the run itself knew; `None` before the
+    /// first state.
+    pub fn z_at(&self, at: Stamp) -> Option<Mm> {
+        let heights = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let later = heights.partition_point(|&(since, _)| since <= at);
+        heights.get(later.checked_sub(1)?).map(|&(_, z)| z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::core::units::MmPerS;
+    use crate::drivers::camera::mcap::robot_z::*;
+    use crate::width_control::{RobotMode, RobotState};
+
+    #[test]
+    fn the_newest_state_counts() {
+        let heights = RobotZ::default();
+        assert_eq!(heights.z_at(Stamp::from_ns(5)), None);
+        for (ns, z) in [(10, 20.0), (20, 20.0), (30, 40.0)] {
+            let state = RobotState {
+                t_ms: 0,
+                seq: 0,
+                mode: RobotMode::Print,
+                speed_mm_per_s: MmPerS::ZERO,
+                path_mm: Mm::ZERO,
+                z_mm: Mm::constant(z),
+            };
+            heights.note(Stamp::from_ns(ns), &Event::Robot(state));
+        }
+        let z = |ns| heights.clone().z_at(Stamp::from_ns(ns)).map(Mm::get);
+        assert_eq!([z(9), z(10), z(29), z(30)], [None, Some(20.0), Some(20.0), Some(40.0)]);
+    }
+}

@@ -1,0 +1,161 @@
+//! Finds out what a source is and opens it.
+
+use std::path::Path;
+
+use crossbeam_channel::Receiver;
+
+use super::fault;
+use super::folder::Folder;
+use super::live::{Live, Patience};
+use super::mcap::{McapSource, RobotZ};
+use super::snapshot::{Snapshot, SnapshotSettings};
+use super::video::VideoFile;
+use crate::bridge::VideoInput;
+use crate::cell::file::{Camera, Source};
+use crate::core::frame::Channel;
+use crate::core::time::Span;
+use crate::io::clock::RunClock;
+use crate::run::ports::{FrameSource, Grab, SourceError};
+
+/// Failures in a row after which a live source counts as lost.
+const ATTEMPTS: u32 = 5;
+
+/// What recorded frames are read with.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct OfflineOptions<'a> {
+    /// Frames a second, where the source does not know.
+    pub fps: Option<f64>,
+    /// Topic of the frames in an MCAP.
+    pub topic: Option<&'a str>,
+    /// Which part of a colour image.
+    pub channel: Channel,
+}
+
+/// A source of recorded frames, and the robot's heights where it knows them.
+pub struct Recorded {
+    /// The frames.
+    pub source: Box<dyn FrameSource>,
+    /// Heights of a robot whose run was recorded with the frames.
+    pub robot_z: Option<RobotZ>,
+}
+
+/// Opens a folder of images, an MCAP or a video file.
+pub fn recorded(path: &Path, options: OfflineOptions<'_>) -> Result<Recorded, SourceError> {
+    let plain = |source: Box<dyn FrameSource>| Recorded { source, robot_z: None };
+    let name = path.display().to_string();
+    if !path.exists() {
+        return Err(fault(&name, "is not there; name a folder of images, a video or an MCAP"));
+    }
+    if path.is_dir() {
+        return Ok(plain(Box::new(Folder::open(path, options.channel, options.fps)?)));
+    }
+    if is_mcap(path) {
+        let source = McapSource::open(path, options.topic, options.channel)?;
+        let robot_z = source.robot_z();
+        return Ok(Recorded { source: Box::new(source), robot_z: Some(robot_z) });
+    }
+    if crate::io::image_file::has_image_extension(path) {
+        return Err(fault(&name, "is a single image; name the folder that it lies in"));
+    }
+    Ok(plain(Box::new(VideoFile::open(path, options.channel, options.fps)?)))
+}
+
+/// Whether a name is that of an MCAP, finished or cut short.
+pub fn is_mcap(path: &Path) -> bool {
+    let ends = |path: &Path, ending: &str| {
+        path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
+    };
+    ends(path, "mcap") || (ends(path, "partial") && ends(&path.with_extension(""), "mcap"))
+}
+
+/// A source that is to give frames as they come.
+#[derive(Debug, Clone, Copy)]
+pub struct LiveOptions<'a> {
+    /// Where frames come from.
+    pub source: &'a Source,
+    /// The source as the user names it.
+    pub name: &'a str,
+    /// Frames a second of sources that do not set their own pace.
+    pub rate_hz: f64,
+    /// Longest wait for a frame before the camera counts as lost.
+    pub deadline: Span,
+    /// Which part of a colour image.
+    pub channel: Channel,
+}
+
+impl<'a> LiveOptions<'a> {
+    /// Of a cell's camera.
+    pub fn of(camera: &'a Camera, channel: Channel) -> Self {
+        Self {
+            source: &camera.source,
+            name: &camera.source_name,
+            rate_hz: camera.rate_hz,
+            deadline: camera.deadline,
+            channel,
+        }
+    }
+}
+
+/// Opens a camera, but for the rendered one. Recorded frames are given out at the
+/// camera's rate, as if they were live; `stop` ends them.
+pub fn live(
+    camera: LiveOptions<'_>,
+    clock: RunClock,
+    stop: Receiver<()>,
+) -> Result<Box<dyn FrameSource>, SourceError> {
+    let channel = camera.channel;
+    let patience = Patience { deadline: camera.deadline, attempts: ATTEMPTS };
+    let device = |input| -> Result<Box<dyn FrameSource>, SourceError> {
+        Ok(Box::new(Live::open(input, camera.name, channel, patience, clock)?))
+    };
+    match camera.source {
+        Source::Index(index) => device(VideoInput::Camera(*index)),
+        Source::Pipeline(pipeline) => device(VideoInput::Pipeline(pipeline.clone())),
+        Source::Url(url) => {
+            let settings = SnapshotSettings {
+                rate_hz: camera.rate_hz,
+                timeout: camera.deadline,
+                attempts: ATTEMPTS,
+            };
+            Ok(Box::new(Snapshot::open(url, channel, settings, clock)?))
+        }
+        Source::Path(path) => {
+            let options = OfflineOptions { channel, ..OfflineOptions::default() };
+            let inner = recorded(path, options)?.source;
+            let period = Span::from_secs(1.0 / camera.rate_hz);
+            Ok(Box::new(Paced { inner, clock, period, due: None, stop }))
+        }
+        Source::Rendered => Err(fault(camera.name, "the rendered camera is opened with its bead")),
+    }
+}
+
+/// Gives recorded frames out at a rate, as if they were captured now.
+struct Paced {
+    inner: Box<dyn FrameSource>,
+    clock: RunClock,
+    period: Span,
+    due: Option<crate::core::time::Stamp>,
+    stop: Receiver<()>,
+}
+
+impl FrameSource for Paced {
+    fn next_frame(&mut self) -> Result<Option<Grab>, SourceError> {
+        let Some(mut grab) = self.inner.next_frame()? else { return Ok(None) };
+        let due = self.due.unwrap_or_else(|| self.clock.now());
+        self.due = Some(due + self.period);
+        let wait = (due - self.clock.now()).max(Span::ZERO);
+        let wait = std::time::Duration::from_nanos(u64::try_from(wait.ns()).unwrap_or(0));
+        // Either a word on the channel or its end means to stop.
+        if self.stop.recv_timeout(wait) != Err(crossbeam_channel::RecvTimeoutError::Timeout) {
+            return Ok(None);
+        }
+        if let Grab::Frame { frame, .. } = &mut grab {
+            frame.captured_at = self.clock.now();
+        }
+        Ok(Some(grab))
+    }
+
+    fn expected_frames(&self) -> Option<u64> {
+        self.inner.expected_frames()
+    }
+}

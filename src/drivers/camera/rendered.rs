@@ -1,0 +1,125 @@
+//! The rendered camera: pictures of a simulated bead that follows the path and
+//! speed that the robot reports.
+
+use std::time::Duration;
+
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
+
+use super::fault;
+use crate::cell::{Camera, Mount};
+use crate::core::time::{Span, Stamp};
+use crate::io::clock::RunClock;
+use crate::run::ports::{FrameSource, Grab, SourceError};
+use crate::scenario::table::Simulation;
+use crate::sim::follow::{Follower, Recipe};
+use crate::sim::render::Renderer;
+use crate::width_control::RobotState;
+
+/// Reports that wait for the camera: some 20 s of a robot that reports every
+/// 20 ms.
+const WAITING_REPORTS: usize = 1024;
+
+/// Tells the camera what the robot reports. Copies feed the same camera.
+#[derive(Debug, Clone)]
+pub struct RobotView(Sender<(Stamp, RobotState)>);
+
+impl RobotView {
+    /// Passes on a report that arrived at a moment; never waits. What a camera
+    /// that takes no frames leaves lying is lost, and the next report stands
+    /// for it.
+    pub fn observe(&self, at: Stamp, state: &RobotState) {
+        let _ = self.0.try_send((at, *state));
+    }
+}
+
+/// Takes pictures at a fixed rate of what lies under the camera.
+pub struct RenderedCamera {
+    renderer: Renderer,
+    follower: Follower,
+    reports: Receiver<(Stamp, RobotState)>,
+    stop: Receiver<()>,
+    clock: RunClock,
+    period: Span,
+    offset_mm: f64,
+    rides: bool,
+    seq: u64,
+    due: Option<Stamp>,
+    first: Option<Stamp>,
+}
+
+impl RenderedCamera {
+    /// A camera as the cell describes it. It ends, within a frame's period,
+    /// when `stop` is sent to or its sender is dropped.
+    pub fn new(
+        renderer: Renderer,
+        simulation: &Simulation,
+        camera: &Camera,
+        clock: RunClock,
+        stop: Receiver<()>,
+    ) -> (Self, RobotView) {
+        let recipe = Recipe {
+            model: simulation.bead,
+            roughness: simulation.roughness,
+            flow: simulation.flow,
+            seed: simulation.seed,
+        };
+        let (told, reports) = bounded(WAITING_REPORTS);
+        let source = Self {
+            renderer,
+            follower: Follower::new(recipe),
+            reports,
+            stop,
+            clock,
+            period: Span::from_secs(1.0 / camera.rate_hz),
+            offset_mm: camera.offset.get(),
+            rides: camera.mount == Mount::Flange,
+            seq: 0,
+            due: None,
+            first: None,
+        };
+        (source, RobotView(told))
+    }
+
+    /// Waits until the next frame is due; false when the camera was stopped.
+    /// Frames that are overdue are left out, not crowded.
+    fn wait(&mut self) -> bool {
+        let now = self.clock.now();
+        let due = self.due.map_or(now, |due| (due + self.period).max(now));
+        self.due = Some(due);
+        loop {
+            let left = (due - self.clock.now()).max(Span::ZERO);
+            let wait = Duration::from_nanos(u64::try_from(left.ns()).unwrap_or(0));
+            match self.stop.recv_timeout(wait) {
+                Err(RecvTimeoutError::Timeout) if self.clock.now() >= due => return true,
+                Err(RecvTimeoutError::Timeout) => {}
+                Ok(()) | Err(RecvTimeoutError::Disconnected) => return false,
+            }
+        }
+    }
+}
+
+impl FrameSource for RenderedCamera {
+    fn next_frame(&mut self) -> Result<Option<Grab>, SourceError> {
+        if !self.wait() {
+            return Ok(None);
+        }
+        let captured_at = self.clock.now();
+        for (at, state) in self.reports.try_iter() {
+            self.follower.observe(at, &state);
+        }
+        let under = self.follower.path_at(captured_at).map(|nozzle| nozzle - self.offset_mm);
+        let bead = self.follower.bead();
+        let robot_z = self.follower.z().filter(|_| self.rides);
+        let rendered = self
+            .renderer
+            .render(self.seq, captured_at, robot_z, &|along| bead.edges_at(under? + along))
+            .map_err(|error| fault("rendered", error.to_string()))?;
+        self.seq += 1;
+        let first = *self.first.get_or_insert(captured_at);
+        let time_s = Some((captured_at - first).secs());
+        Ok(Some(Grab::Frame { frame: rendered.frame, time_s }))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,142 @@
+//! Keeps a connection: connect, `HELLO`, listen, and again.
+
+use std::net::{TcpStream, ToSocketAddrs};
+use std::time::Duration;
+
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
+
+use super::incoming::{Incoming, Lost, Why};
+use super::outgoing::{Outgoing, write_line};
+use super::{Dialect, EventOf, Heard, LinkEvent};
+use crate::core::time::{Span, Stamp};
+use crate::link::PcLine;
+
+/// Nobody listens to the events any more.
+struct Deaf;
+
+/// How a session ended.
+struct Ended {
+    why: Lost,
+    /// The other side had answered `HELLO`.
+    was_up: bool,
+    /// It had also sent a `STATE`.
+    was_good: bool,
+}
+
+/// Connects again and again until the link is closed or nobody listens.
+pub(super) fn keep_up<D: Dialect>(
+    out: &Outgoing<D>,
+    events: &Sender<EventOf<D>>,
+    quitting: &Receiver<()>,
+) {
+    let timing = out.timing;
+    let mut delay = timing.first_delay;
+    let mut told = None;
+    while !out.closing() {
+        let Ok(ended) = session(out, events) else { return };
+        let broken = out.lost();
+        if out.closing() {
+            return;
+        }
+        let reason = broken.unwrap_or_else(|| ended.why.to_string());
+        if ended.was_up || told.as_ref() != Some(&reason) {
+            let down = LinkEvent::Down { at: out.clock.now(), reason: reason.clone() };
+            if events.send(down).is_err() {
+                return;
+            }
+            told = Some(reason);
+        }
+        if ended.was_good {
+            delay = timing.first_delay;
+        }
+        match quitting.recv_timeout(delay) {
+            Err(RecvTimeoutError::Timeout) => delay = (delay * 2).min(timing.longest_delay),
+            _ => return,
+        }
+    }
+}
+
+fn session<D: Dialect>(out: &Outgoing<D>, events: &Sender<EventOf<D>>) -> Result<Ended, Deaf> {
+    let ended = |why| Ok(Ended { why: Lost::of::<D>(why), was_up: false, was_good: false });
+    let stream = match connect(out) {
+        Ok(stream) => stream,
+        Err(why) => return ended(why),
+    };
+    let (mut incoming, hello, at) = match greet(out, &stream) {
+        Ok(greeted) => greeted,
+        Err(why) => return ended(why),
+    };
+    out.opened(stream, hello.clone());
+    events.send(LinkEvent::Up { at, hello }).map_err(|_| Deaf)?;
+    // A close that came while the other side was being greeted found nothing
+    // to shut.
+    if out.closing() {
+        out.close();
+    }
+    listen(out, events, &mut incoming, at)
+}
+
+fn connect<D: Dialect>(out: &Outgoing<D>) -> Result<TcpStream, Why> {
+    let address = &out.address;
+    let fail = |reason: String| Why::Connect { address: address.clone(), reason };
+    let mut reason = "the name has no address".to_owned();
+    for candidate in address.to_socket_addrs().map_err(|e| fail(e.to_string()))? {
+        match TcpStream::connect_timeout(&candidate, out.timing.connect) {
+            Ok(stream) => {
+                stream.set_nodelay(true)?;
+                stream.set_write_timeout(Some(out.timing.write))?;
+                return Ok(stream);
+            }
+            Err(error) => reason = error.to_string(),
+        }
+    }
+    Err(fail(reason))
+}
+
+fn greet<D: Dialect>(
+    out: &Outgoing<D>,
+    stream: &TcpStream,
+) -> Result<(Incoming<D>, D::Hello, Stamp), Why> {
+    let mut stream = stream.try_clone()?;
+    write_line(&mut stream, &PcLine::Hello.format())?;
+    let mut incoming = Incoming::new(stream, out.clock);
+    let deadline = out.clock.now() + span(out.timing.hello);
+    loop {
+        match incoming.next(deadline)? {
+            Some((at, Heard::Hello(hello))) => return Ok((incoming, hello, at)),
+            Some(_) => {}
+            None => return Err(Why::NoHello),
+        }
+    }
+}
+
+fn listen<D: Dialect>(
+    out: &Outgoing<D>,
+    events: &Sender<EventOf<D>>,
+    incoming: &mut Incoming<D>,
+    up_at: Stamp,
+) -> Result<Ended, Deaf> {
+    let silence = out.timing.silence;
+    let (mut heard, mut was_good) = (up_at, false);
+    let why = loop {
+        let event = match incoming.next(heard + span(silence)) {
+            Ok(Some((at, Heard::State(state)))) => {
+                (heard, was_good) = (at, true);
+                out.seen(state);
+                LinkEvent::State { at, state }
+            }
+            Ok(Some((at, Heard::Err { seq, code, text }))) => {
+                LinkEvent::Refused { at, seq, code, text }
+            }
+            Ok(Some((_, Heard::Hello(_)))) => continue,
+            Ok(None) => break Why::Silence(silence),
+            Err(why) => break why,
+        };
+        events.send(event).map_err(|_| Deaf)?;
+    };
+    Ok(Ended { why: Lost::of::<D>(why), was_up: true, was_good })
+}
+
+fn span(duration: Duration) -> Span {
+    Span::from_ns(i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX))
+}

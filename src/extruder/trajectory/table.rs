@@ -1,0 +1,172 @@
+//! The table of a plan, `plan.csv`.
+
+use std::sync::Arc;
+
+use super::{PlannedCourse, PlannedJob, Row};
+use crate::core::quantity::Unit;
+use crate::document::csv::in_words;
+
+/// How the column of the command begins; its end is the unit.
+const COMMAND: &str = "command_";
+const BEAD: &str = "bead";
+const NUMBERS: [&str; 4] = ["time_s", "path_mm", "speed_mm_per_s", "flow_mm3_per_s"];
+
+/// A table that is no plan. Lines are counted from 1, the heading included.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TableError {
+    /// A column is missing.
+    #[error("the heading has no column {column}; a plan comes from truebead plan")]
+    Column {
+        /// Which one.
+        column: String,
+    },
+    /// Two columns of commands, or one in a unit that nobody knows.
+    #[error("the heading has {found} for the command, expected one column such as command_rpm")]
+    Command {
+        /// What was found.
+        found: String,
+    },
+    /// A row that is not as long as the heading, or no text.
+    #[error("line {line}: {what}; was the file cut short? Plan the job again")]
+    Row {
+        /// Where.
+        line: u64,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A field that is no number, or one that cannot be.
+    #[error("line {line}: {column} is \"{found}\", expected {expected}")]
+    Number {
+        /// Where.
+        line: u64,
+        /// Which column.
+        column: String,
+        /// What was found.
+        found: String,
+        /// What would do.
+        expected: &'static str,
+    },
+    /// A bead of which there are fewer than two rows.
+    #[error("found a bead with fewer than two rows, expected its whole course")]
+    Short,
+}
+
+/// Where each column is.
+struct Columns {
+    bead: usize,
+    numbers: [usize; 4],
+    command: usize,
+    command_name: String,
+}
+
+impl Columns {
+    fn of(heading: &csv::StringRecord) -> Result<(Self, Unit), TableError> {
+        let place = |column: &str| {
+            let at = heading.iter().position(|name| name == column);
+            at.ok_or_else(|| TableError::Column { column: column.to_owned() })
+        };
+        let [time, path, speed, flow] = NUMBERS.map(place);
+        let commands: Vec<(usize, &str)> =
+            heading.iter().enumerate().filter(|(_, name)| name.starts_with(COMMAND)).collect();
+        let &[(command, name)] = commands.as_slice() else {
+            let names: Vec<&str> = commands.iter().map(|(_, name)| *name).collect();
+            let found = if names.is_empty() { "nothing".into() } else { names.join(", ") };
+            return Err(TableError::Command { found });
+        };
+        let unit = Unit::of_word(name.trim_start_matches(COMMAND));
+        let unit = unit.ok_or_else(|| TableError::Command { found: name.to_owned() })?;
+        let columns = Self {
+            bead: place(BEAD)?,
+            numbers: [time?, path?, speed?, flow?],
+            command,
+            command_name: name.to_owned(),
+        };
+        Ok((columns, unit))
+    }
+
+    fn row(&self, record: &csv::StringRecord, line: u64) -> Result<Row, TableError> {
+        let number = |at: usize, column: &str, least: f64, expected: &'static str| {
+            let found = record.get(at).unwrap_or_default();
+            let value = found.parse().ok();
+            value.filter(|value: &f64| value.is_finite() && *value >= least).ok_or_else(|| {
+                TableError::Number {
+                    line,
+                    column: column.to_owned(),
+                    found: found.to_owned(),
+                    expected,
+                }
+            })
+        };
+        let known = |k: usize| number(self.numbers[k], NUMBERS[k], 0.0, "a number of 0 or more");
+        Ok(Row {
+            time_s: known(0)?,
+            path_mm: known(1)?,
+            speed_mm_per_s: known(2)?,
+            flow_mm3_per_s: known(3)?,
+            command: number(self.command, &self.command_name, f64::NEG_INFINITY, "a number")?,
+        })
+    }
+}
+
+/// Reads a plan.
+pub fn read(text: &str) -> Result<PlannedJob, TableError> {
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let of_row = |error: csv::Error| {
+        let (line, what) = in_words(&error);
+        TableError::Row { line, what }
+    };
+    let (columns, unit) = Columns::of(reader.headers().map_err(of_row)?)?;
+    let mut beads: Vec<(String, Vec<Row>)> = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(of_row)?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let row = columns.row(&record, line)?;
+        let bead = record.get(columns.bead).unwrap_or_default();
+        match beads.last_mut().filter(|(name, _)| name == bead) {
+            None => {
+                begins(&row, line)?;
+                beads.push((bead.to_owned(), vec![row]));
+            }
+            Some((_, rows)) => {
+                follows(rows.last(), &row, line)?;
+                rows.push(row);
+            }
+        }
+    }
+    if beads.is_empty() || beads.iter().any(|(_, rows)| rows.len() < 2) {
+        return Err(TableError::Short);
+    }
+    let course = |(_, rows)| Arc::new(PlannedCourse { rows });
+    Ok(PlannedJob { unit, beads: beads.into_iter().map(course).collect() })
+}
+
+fn wrong(line: u64, column: &str, found: f64, expected: &'static str) -> TableError {
+    TableError::Number { line, column: column.to_owned(), found: found.to_string(), expected }
+}
+
+/// What a bead in a cell begins with.
+const EXPECTED: &str = "a bead that begins at a speed above 0, for the cell starts it itself: plan \
+                        G-code with --ends moving";
+
+fn begins(row: &Row, line: u64) -> Result<(), TableError> {
+    for (column, found) in [("time_s", row.time_s), ("path_mm", row.path_mm)] {
+        if found > 0.0 {
+            return Err(wrong(line, column, found, "0 where a bead begins"));
+        }
+    }
+    if row.speed_mm_per_s <= 0.0 {
+        return Err(wrong(line, "speed_mm_per_s", 0.0, EXPECTED));
+    }
+    Ok(())
+}
+
+fn follows(before: Option<&Row>, row: &Row, line: u64) -> Result<(), TableError> {
+    let Some(before) = before else { return Ok(()) };
+    if row.time_s <= before.time_s {
+        return Err(wrong(line, "time_s", row.time_s, "more than in the row before"));
+    }
+    if row.path_mm < before.path_mm {
+        return Err(wrong(line, "path_mm", row.path_mm, "no less than in the row before"));
+    }
+    Ok(())
+}

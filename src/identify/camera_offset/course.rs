@@ -1,0 +1,276 @@
+//! The speed at which bead was laid, along the path.
+
+use super::data::Look;
+use super::data::float;
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm, MmPerS};
+use crate::width_control::RobotState;
+
+/// Longest time between two reports over which the speed is taken to have changed
+/// evenly; the link counts as lost after it.
+const LONGEST_GAP: Span = Span::from_millis(500);
+/// A path that falls back by less is the same bead \[mm\].
+const FALL_BACK_MM: f64 = 0.01;
+/// Grid along the path on which speeds are summed up \[mm\].
+const STEP_MM: f64 = 0.5;
+/// Longest bead \[mm\]; a longer one is a path that jumped.
+const LONGEST_MM: f64 = 1e7;
+/// Share of the usual speed below which a bead is at its beginning or its end, where its
+/// width is no power of the speed.
+const SLOWEST: f64 = 0.2;
+/// Growth of the speed over a millimetre, as a share, beyond which a bead that begins is
+/// still run up, or one that ends run out: there, too, its width is something else.
+const RUN_UP_PER_MM: f64 = 0.01;
+
+/// All beads of a recording.
+#[derive(Debug, Clone)]
+pub struct Course {
+    beads: Vec<Bead>,
+    slowest: f64,
+}
+
+/// Reports of one bead without a gap.
+#[derive(Debug, Clone, Default)]
+struct Bead {
+    times: Vec<Stamp>,
+    /// The robot's own clock \[s\].
+    clocks: Vec<f64>,
+    paths: Vec<f64>,
+    speeds: Vec<f64>,
+    /// Nodes of the grid up to each, at which the bead was laid slower than the slowest, or
+    /// was run up or out.
+    slow: Vec<u32>,
+}
+
+/// Sums along one bead from which means over stretches of it are read.
+#[derive(Debug, Clone)]
+pub struct Sums {
+    start_mm: f64,
+    exponent: f64,
+    /// Integral of v^−b from the start to each node \[mm·(mm/s)^−b\].
+    to_nodes: Vec<f64>,
+    /// v^−b at both ends.
+    ends: (f64, f64),
+}
+
+impl Course {
+    /// Of what the robot reported, in order; `None` where it laid nothing.
+    pub fn of(states: &[(Stamp, RobotState)]) -> Option<Self> {
+        let mut beads: Vec<Bead> = Vec::new();
+        let mut open = false;
+        for (at, state) in states {
+            if !state.mode.lays_bead() {
+                open = false;
+                continue;
+            }
+            let follows = open && beads.last().is_some_and(|bead| bead.is_followed_by(*at, state));
+            if !follows {
+                beads.push(Bead::default());
+                open = true;
+            }
+            if let Some(bead) = beads.last_mut() {
+                bead.push(*at, state);
+            }
+        }
+        beads.retain(|bead| bead.length_mm() > 0.0 && bead.length_mm() < LONGEST_MM);
+        let mut speeds: Vec<f64> = beads.iter().flat_map(Bead::on_grid).collect();
+        if speeds.is_empty() {
+            return None;
+        }
+        speeds.sort_by(f64::total_cmp);
+        let slowest = (SLOWEST * speeds[speeds.len() / 2]).max(f64::MIN_POSITIVE);
+        for bead in &mut beads {
+            bead.mark_slow(slowest);
+        }
+        Some(Self { beads, slowest })
+    }
+
+    /// Bead and path of the nozzle at a moment \[mm\], on the line between two reports.
+    pub fn path_at(&self, at: Stamp) -> Option<(usize, f64)> {
+        let number = self.beads.partition_point(|bead| bead.times.last() < Some(&at));
+        Some((number, self.beads.get(number)?.path_at(at)?))
+    }
+
+    /// Slowest and fastest speed along the path, without a share of it at either end of
+    /// the range and without what is too slow to count.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "a share of a count"
+    )]
+    pub fn range(&self, tail: f64) -> (MmPerS, MmPerS) {
+        let speeds = self.beads.iter().flat_map(Bead::on_grid);
+        let mut speeds: Vec<f64> = speeds.filter(|&speed| speed >= self.slowest).collect();
+        speeds.sort_by(f64::total_cmp);
+        let last = speeds.len().saturating_sub(1);
+        let skip = (tail * last as f64) as usize;
+        let at =
+            |i: usize| MmPerS::new(speeds.get(i).copied().unwrap_or(0.0)).unwrap_or(MmPerS::ZERO);
+        (at(skip), at(last - skip))
+    }
+
+    /// Whether the speed is known, and large enough, all over the gauge of a width at an
+    /// offset \[mm\].
+    pub fn knows(&self, look: &Look, offset_mm: f64, gauge: Mm) -> bool {
+        let middle = look.path_mm - offset_mm;
+        let half = 0.5 * gauge.get();
+        self.beads.get(look.bead).is_some_and(|bead| bead.knows(middle - half, middle + half))
+    }
+
+    /// How far along the path changes of speed may lie from where they are taken to be
+    /// \[mm\]: between two reports the robot came further than it would at an even
+    /// change if it slowed down later than that, or sped up sooner. The mean, weighted as
+    /// the changes tell the offset, by their squares.
+    pub fn lag_mm(&self) -> f64 {
+        let (mut ways, mut changes) = (0.0, 0.0);
+        for (way, change) in self.beads.iter().flat_map(Bead::changes) {
+            ways += way * change;
+            changes += change * change;
+        }
+        if changes > 0.0 { (ways / changes).abs() } else { 0.0 }
+    }
+
+    /// Sums of every bead for an exponent.
+    pub fn sums(&self, exponent: f64) -> Vec<Sums> {
+        self.beads.iter().map(|bead| bead.sums(exponent, self.slowest)).collect()
+    }
+}
+
+impl Bead {
+    fn is_followed_by(&self, at: Stamp, state: &RobotState) -> bool {
+        let (Some(&last_at), Some(&last)) = (self.times.last(), self.paths.last()) else {
+            return true;
+        };
+        at > last_at && at - last_at <= LONGEST_GAP && state.path_mm.get() >= last - FALL_BACK_MM
+    }
+
+    fn push(&mut self, at: Stamp, state: &RobotState) {
+        let last = self.paths.last().copied().unwrap_or(f64::NEG_INFINITY);
+        self.times.push(at);
+        self.clocks.push(Span::from_millis(i64::try_from(state.t_ms).unwrap_or(0)).secs());
+        self.paths.push(state.path_mm.get().max(last));
+        self.speeds.push(state.speed_mm_per_s.get().abs());
+    }
+
+    fn start_mm(&self) -> f64 {
+        self.paths.first().copied().unwrap_or(0.0)
+    }
+
+    fn length_mm(&self) -> f64 {
+        self.paths.last().map_or(0.0, |last| last - self.start_mm())
+    }
+
+    fn path_at(&self, at: Stamp) -> Option<f64> {
+        let after = self.times.partition_point(|time| *time < at);
+        if self.times.get(after) == Some(&at) {
+            return self.paths.get(after).copied();
+        }
+        let before = after.checked_sub(1)?;
+        let (from, to) = (*self.times.get(before)?, *self.times.get(after)?);
+        let share = (at - from).secs() / (to - from).secs();
+        Some(self.paths[before] + (self.paths[after] - self.paths[before]) * share)
+    }
+
+    /// Speeds at the nodes of the grid: evenly from one report to the next along the
+    /// path.
+    fn on_grid(&self) -> impl Iterator<Item = f64> {
+        let start = self.start_mm();
+        let mut next = 1;
+        (0..=number(self.length_mm() / STEP_MM)).map(move |node| {
+            let path = start + float(node) * STEP_MM;
+            while next + 1 < self.paths.len() && self.paths[next] < path {
+                next += 1;
+            }
+            let (from, to) = (self.paths[next - 1], self.paths[next]);
+            let share = if to > from { ((path - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
+            self.speeds[next - 1] + (self.speeds[next] - self.speeds[next - 1]) * share
+        })
+    }
+
+    /// Between any two reports: how much further the robot came than at an even change of
+    /// its speed \[mm\], times the mean speed, and the change.
+    fn changes(&self) -> impl Iterator<Item = (f64, f64)> {
+        (1..self.paths.len()).map(|i| {
+            let pair = |values: &[f64]| (values[i - 1], values[i]);
+            let (before, after) = pair(&self.speeds);
+            let [way, time] = [pair(&self.paths), pair(&self.clocks)].map(|(from, to)| to - from);
+            let mean = 0.5 * (before + after);
+            (mean * (way - mean * time), after - before)
+        })
+    }
+
+    fn mark_slow(&mut self, slowest: f64) {
+        let speeds: Vec<f64> = self.on_grid().collect();
+        let from = run_up(speeds.iter(), slowest);
+        let to = speeds.len() - run_up(speeds.iter().rev(), slowest);
+        let slow = speeds.iter().enumerate().scan(0, |count, (node, speed)| {
+            *count += u32::from(*speed < slowest || node < from || node >= to);
+            Some(*count)
+        });
+        self.slow = slow.collect();
+    }
+
+    fn knows(&self, from_mm: f64, to_mm: f64) -> bool {
+        let (from, to) = (from_mm - self.start_mm(), to_mm - self.start_mm());
+        if from < 0.0 || to > self.length_mm() {
+            return false;
+        }
+        // Both nodes about either end count: a gauge may be as short as a point.
+        let before = number(from / STEP_MM).checked_sub(1).and_then(|node| self.slow.get(node));
+        let after = self.slow.get(number(to / STEP_MM) + 1).or(self.slow.last());
+        before.copied().unwrap_or(0) == after.copied().unwrap_or(0)
+    }
+
+    fn sums(&self, exponent: f64, slowest: f64) -> Sums {
+        let powers: Vec<f64> =
+            self.on_grid().map(|speed| speed.max(slowest).powf(-exponent)).collect();
+        let mut sum = 0.0;
+        let mut to_nodes = vec![0.0];
+        to_nodes.extend(powers.windows(2).map(|pair| {
+            sum += STEP_MM * 0.5 * (pair[0] + pair[1]);
+            sum
+        }));
+        let end = |power: Option<&f64>| power.copied().unwrap_or(1.0);
+        let ends = (end(powers.first()), end(powers.last()));
+        Sums { start_mm: self.start_mm(), exponent, to_nodes, ends }
+    }
+}
+
+/// Nodes from a bead's end inwards over which the speed still grows fast.
+fn run_up<'a>(speeds: impl Iterator<Item = &'a f64> + Clone, slowest: f64) -> usize {
+    let grows = |here: f64, next: f64| next > here * (1.0 + RUN_UP_PER_MM * STEP_MM);
+    let pairs = speeds.clone().zip(speeds.skip(1));
+    pairs.take_while(|(here, next)| **here < slowest || grows(**here, **next)).count()
+}
+
+impl Sums {
+    /// Logarithm of the speed that lays a bead as wide as the mean over a stretch about a
+    /// place. Beyond the ends of what is known the speed is taken to have been as at
+    /// them.
+    pub fn ln_speed(&self, middle_mm: f64, length: Mm) -> f64 {
+        let length = length.get().max(STEP_MM);
+        let from = middle_mm - 0.5 * length;
+        let mean = (self.up_to(from + length) - self.up_to(from)) / length;
+        -mean.ln() / self.exponent
+    }
+
+    fn up_to(&self, path_mm: f64) -> f64 {
+        let place = (path_mm - self.start_mm) / STEP_MM;
+        let last = self.to_nodes.len() - 1;
+        if place <= 0.0 {
+            return place * STEP_MM * self.ends.0;
+        }
+        let node = number(place);
+        if node >= last {
+            return self.to_nodes[last] + (place - float(last)) * STEP_MM * self.ends.1;
+        }
+        self.to_nodes[node]
+            + (self.to_nodes[node + 1] - self.to_nodes[node]) * (place - float(node))
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates at 0")]
+fn number(place: f64) -> usize {
+    place as usize
+}

@@ -1,0 +1,55 @@
+//! All that is known of a bead once its offset is.
+
+use super::Found;
+use crate::core::units::MmPerS;
+
+/// The bead's model that was fitted, and the widths beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Study {
+    /// Offset and exponent.
+    pub found: Found,
+    /// Standard deviation of the exponent, with what is open in the offset.
+    pub exponent_sigma: f64,
+    /// The width where the speed is as the mean \[mm\].
+    pub level_mm: f64,
+    /// That mean of the speed \[mm/s\].
+    pub mean_speed_mm_per_s: f64,
+    /// Variances of the level, as a share, and of the exponent, and their covariance.
+    pub(super) covariance: [f64; 3],
+    /// The widths that told it, one by one.
+    pub seen: Vec<Seen>,
+    /// The same in means over a gauge's length of path.
+    pub pieces: Vec<Seen>,
+}
+
+/// Widths beside the speed that laid them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// Number of the bead.
+    pub bead: usize,
+    /// Path of the nozzle when they were measured \[mm\].
+    pub path_mm: f64,
+    /// How many widths these are the means of.
+    pub count: usize,
+    /// Logarithm of the width in mm.
+    pub ln_width: f64,
+    /// Logarithm of the speed in mm/s, in the mean over the gauge.
+    pub ln_speed: f64,
+}
+
+impl Study {
+    /// Width at a speed, and its standard deviation \[mm\].
+    pub fn width_at(&self, speed: MmPerS) -> (f64, f64) {
+        let faster = (speed.get() / self.mean_speed_mm_per_s).ln();
+        let width = self.level_mm * (-self.found.exponent * faster).exp();
+        let [level, exponent, both] = self.covariance;
+        let variance = level - 2.0 * faster * both + faster * faster * exponent;
+        (width, width * variance.max(0.0).sqrt())
+    }
+
+    /// What is left of a width, as a share.
+    pub fn left(&self, seen: &Seen) -> f64 {
+        let faster = seen.ln_speed - self.mean_speed_mm_per_s.ln();
+        seen.ln_width - self.level_mm.ln() + self.found.exponent * faster
+    }
+}

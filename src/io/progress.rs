@@ -1,0 +1,121 @@
+//! Progress on standard error: a bar on a terminal, plain lines otherwise.
+
+use std::io::{IsTerminal, Write};
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// Work shorter than this gives no plain line.
+const FIRST_LINE: Duration = Duration::from_secs(2);
+/// Time between plain lines.
+const NEXT_LINE: Duration = Duration::from_secs(5);
+
+/// How far a piece of work has come.
+#[derive(Debug)]
+pub struct Progress {
+    bar: ProgressBar,
+    what: &'static str,
+    unit: &'static str,
+    plain: bool,
+    next_line: Duration,
+    said: bool,
+}
+
+impl Progress {
+    /// Begins; `what` is the work ("measuring"), `unit` what is counted
+    /// ("frames"). Says nothing if `quiet`.
+    pub fn new(what: &'static str, unit: &'static str, total: Option<u64>, quiet: bool) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let target = if terminal && !quiet {
+            ProgressDrawTarget::stderr_with_hz(8)
+        } else {
+            ProgressDrawTarget::hidden()
+        };
+        let bar = ProgressBar::with_draw_target(total, target);
+        let template = if total.is_some() {
+            "{msg} {wide_bar} {pos}/{len} {prefix}, {eta} left"
+        } else {
+            "{msg} {spinner} {pos} {prefix}, {elapsed}"
+        };
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.set_message(what);
+        bar.set_prefix(unit);
+        Self { bar, what, unit, plain: !terminal && !quiet, next_line: FIRST_LINE, said: false }
+    }
+
+    /// So many are done.
+    pub fn set(&mut self, done: u64) {
+        self.bar.set_position(done);
+        if self.plain && self.bar.elapsed() >= self.next_line {
+            self.next_line = self.bar.elapsed() + NEXT_LINE;
+            self.say(done, "");
+        }
+    }
+
+    /// One more is done.
+    pub fn advance(&mut self) {
+        self.set(self.bar.position() + 1);
+    }
+
+    /// Writes a line above the bar, for a word on the way.
+    pub fn note(&self, line: &str) {
+        self.bar.suspend(|| {
+            // Where standard error is gone there is nobody to tell.
+            let _ = writeln!(std::io::stderr(), "{line}");
+        });
+    }
+
+    /// Ends; the bar goes away, plain lines get a last one.
+    pub fn finish(mut self) {
+        let done = self.bar.position();
+        self.bar.finish_and_clear();
+        if self.said {
+            self.say(done, ", done");
+        }
+    }
+
+    fn say(&mut self, done: u64, end: &str) {
+        self.said = true;
+        let line = line(self.what, self.unit, done, self.bar.length(), self.bar.elapsed());
+        let _ = writeln!(std::io::stderr(), "{line}{end}");
+    }
+}
+
+fn line(what: &str, unit: &str, done: u64, total: Option<u64>, elapsed: Duration) -> String {
+    let secs = elapsed.as_secs();
+    match total.filter(|total| *total > 0) {
+        Some(total) => {
+            let percent = u128::from(done) * 100 / u128::from(total);
+            format!("{what}: {done} of {total} {unit} ({percent} %), {secs} s")
+        }
+        None => format!("{what}: {done} {unit}, {secs} s"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::io::progress::*;
+
+    #[test]
+    fn plain_lines_say_how_far() {
+        let three = Duration::from_millis(3400);
+        assert_eq!(
+            line("measuring", "frames", 50, Some(200), three),
+            "measuring: 50 of 200 frames (25 %), 3 s"
+        );
+        assert_eq!(line("running", "frames", 50, None, three), "running: 50 frames, 3 s");
+        assert_eq!(line("running", "frames", 0, Some(0), three), "running: 0 frames, 3 s");
+    }
+
+    #[test]
+    fn a_quiet_bar_counts_and_says_nothing() {
+        let mut progress = Progress::new("measuring", "frames", Some(3), true);
+        progress.advance();
+        progress.advance();
+        assert_eq!(progress.bar.position(), 2);
+        assert!(progress.bar.is_hidden() && !progress.said);
+        progress.finish();
+    }
+}

@@ -1,0 +1,256 @@
+//! The columns that a recording holds of an extruder, a robot and a bead, for
+//! finding a model in them.
+
+use crate::core::quantity::Unit;
+use crate::core::time::Stamp;
+use crate::core::units::{MPa, Mm, Mm3PerS, MmPerS, Rpm};
+use crate::extruder::demand::section;
+use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
+use crate::identify::series::Series;
+use crate::io::recording::{Entry, RecordingError};
+use crate::width_control::{Event, RobotState, Step};
+
+/// Name of the command's column, before its unit.
+pub const COMMAND: &str = "command";
+
+/// What has to be known of the cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Facts {
+    /// Unit of the extruder's command, where it is commanded.
+    pub command: Option<Unit>,
+    /// Height of a layer, if it is known.
+    pub layer_height: Option<Mm>,
+    /// Path length from the nozzle back to where the width is measured.
+    pub offset: Mm,
+}
+
+/// What a recording holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recorded {
+    /// Columns, on the clock of the run; those without a sample are left out.
+    pub columns: Vec<Series>,
+    /// What the reader should know of them.
+    pub notes: Vec<String>,
+}
+
+/// The columns of one bead: the longest stretch over which the robot lays bead
+/// and the pump, where it reports, runs. Fails where the recording cannot be
+/// read on.
+pub fn columns(
+    entries: impl IntoIterator<Item = Result<Entry, RecordingError>>,
+    facts: &Facts,
+) -> Result<Recorded, RecordingError> {
+    let mut found = Found::new(facts);
+    for entry in entries {
+        match entry? {
+            Entry::Event { now, event, .. } => found.event(now, &event),
+            Entry::Step { now, step, .. } => found.step(now, &step),
+            Entry::Frame(_) => {}
+        }
+    }
+    Ok(found.conclude(facts))
+}
+
+/// A stretch of time \[s\].
+#[derive(Debug, Clone, Copy)]
+struct Stretch {
+    from_s: f64,
+    to_s: f64,
+}
+
+impl Stretch {
+    fn length_s(&self) -> f64 {
+        self.to_s - self.from_s
+    }
+}
+
+/// Stretches of time over which something is so.
+#[derive(Debug, Default)]
+struct Stretches {
+    all: Vec<Stretch>,
+    is_open: bool,
+}
+
+impl Stretches {
+    fn observe(&mut self, now_s: f64, is_so: bool, is_new: bool) {
+        match self.all.last_mut() {
+            Some(last) if is_so && self.is_open && !is_new => last.to_s = now_s,
+            _ if is_so => self.all.push(Stretch { from_s: now_s, to_s: now_s }),
+            _ => {}
+        }
+        self.is_open = is_so;
+    }
+}
+
+struct Found {
+    command: Series,
+    reported: [Series; 4],
+    speed: Series,
+    path: Series,
+    width: Series,
+    laying: Stretches,
+    pumping: Stretches,
+    /// Whether anything was reported by an extruder.
+    has_pump: bool,
+}
+
+impl Found {
+    fn new(facts: &Facts) -> Self {
+        let measured = |name: &str| Series::new(name, false);
+        let unit = facts.command.unwrap_or(Unit::One).word();
+        Self {
+            command: Series::new(format!("{COMMAND}_{unit}"), true),
+            reported: ["screw_rpm", "pressure_mpa", "flow_mm3_per_s", "filled_mm"].map(measured),
+            speed: measured("speed_mm_per_s"),
+            path: measured("path_mm"),
+            width: measured("width_mm"),
+            laying: Stretches::default(),
+            pumping: Stretches::default(),
+            has_pump: false,
+        }
+    }
+
+    fn event(&mut self, now: Stamp, event: &Event) {
+        match event {
+            Event::Robot(state) => self.robot(now.secs(), state),
+            Event::Extruder(report) => self.extruder(now.secs(), report),
+            Event::Measured { captured_at, width_mm, .. } => {
+                self.width.push(captured_at.secs(), width_mm.get());
+            }
+            _ => {}
+        }
+    }
+
+    fn step(&mut self, now: Stamp, step: &Step) {
+        let command = step.extruder.as_ref().and_then(|side| side.command);
+        if let Some(ExtruderCommand { pump_on: true, value, .. }) = command {
+            self.command.push(now.secs(), value);
+        }
+    }
+
+    fn robot(&mut self, now_s: f64, state: &RobotState) {
+        let path = state.path_mm.get();
+        let falls = self.path.values.last().is_some_and(|last| path < *last);
+        self.laying.observe(now_s, state.mode.lays_bead(), falls);
+        self.speed.push(now_s, state.speed_mm_per_s.get());
+        self.path.push(now_s, path);
+    }
+
+    fn extruder(&mut self, now_s: f64, report: &ExtruderReport) {
+        self.has_pump = true;
+        self.pumping.observe(now_s, report.pump == PumpMode::On, false);
+        let values = [
+            report.screw_rpm.map(Rpm::get),
+            report.pressure_mpa.map(MPa::get),
+            report.flow_mm3_per_s.map(Mm3PerS::get),
+            report.filled_mm.map(Mm::get),
+        ];
+        for (column, value) in self.reported.iter_mut().zip(values) {
+            if let Some(value) = value {
+                column.push(now_s, value);
+            }
+        }
+    }
+
+    /// The longest stretch of a bead with a running pump, and how many there
+    /// are.
+    fn stretch(&self) -> (Option<Stretch>, usize) {
+        let both = |bead: &Stretch| -> Vec<Stretch> {
+            if !self.has_pump {
+                return vec![*bead];
+            }
+            let cut = self.pumping.all.iter().map(|pump| Stretch {
+                from_s: pump.from_s.max(bead.from_s),
+                to_s: pump.to_s.min(bead.to_s),
+            });
+            cut.filter(|stretch| stretch.length_s() > 0.0).collect()
+        };
+        let all: Vec<Stretch> = self.laying.all.iter().flat_map(both).collect();
+        let longest = all.iter().max_by(|a, b| a.length_s().total_cmp(&b.length_s()));
+        (longest.copied(), all.len())
+    }
+
+    fn conclude(self, facts: &Facts) -> Recorded {
+        let mut notes = Vec::new();
+        let (stretch, count) = self.stretch();
+        let Some(stretch) = stretch else {
+            let what = "no bead was laid with a running pump: there is nothing to find a model in";
+            return Recorded { columns: Vec::new(), notes: vec![what.to_owned()] };
+        };
+        if count > 1 {
+            notes.push(format!(
+                "{count} beads were laid; the longest is taken, {:.2} to {:.2} s",
+                stretch.from_s, stretch.to_s
+            ));
+        }
+        let cut = |column: &Series| column.within(stretch.from_s, stretch.to_s);
+        let bead = Bead { path: cut(&self.path), speed: cut(&self.speed), width: cut(&self.width) };
+        let (laid, more) = bead.laid(facts);
+        notes.extend(more);
+        let command = facts.command.map(|_| cut(&self.command));
+        let columns = command.into_iter().chain(self.reported.iter().map(cut));
+        let Bead { path, speed, width } = bead;
+        let columns = columns.chain([speed, path, width]).chain(laid);
+        Recorded { columns: columns.filter(|column| !column.is_empty()).collect(), notes }
+    }
+}
+
+/// One bead as robot and camera tell of it.
+struct Bead {
+    path: Series,
+    speed: Series,
+    width: Series,
+}
+
+impl Bead {
+    /// The width and the flow of the bead at the moments when it was laid: what
+    /// the camera sees left the nozzle when that was the offset further back
+    /// along the path.
+    fn laid(&self, facts: &Facts) -> ([Series; 2], Option<String>) {
+        let mut width = Series::new("laid_width_mm", false);
+        let mut flow = Series::new("laid_flow_mm3_per_s", false);
+        let mut too_narrow = 0_usize;
+        for (seen_s, seen) in self.width.time_s.iter().zip(&self.width.values) {
+            let place = self.path.at(*seen_s).map(|path| path - facts.offset.get());
+            let Some(laid_s) = place.and_then(|place| self.passed(place)) else { continue };
+            width.push(laid_s, *seen);
+            let Some(height) = facts.layer_height else { continue };
+            match self.flow(laid_s, *seen, height) {
+                Some(value) => flow.push(laid_s, value),
+                None => too_narrow += 1,
+            }
+        }
+        let note = match facts.layer_height {
+            None if !width.is_empty() => Some(
+                "there is no laid_flow_mm3_per_s: the cell has no layer height; tell it with \
+                 --layer-height-mm"
+                    .to_owned(),
+            ),
+            Some(height) if too_narrow > 0 => Some(format!(
+                "{too_narrow} of {} widths are less than the layer's height of {height} and are \
+                 not in laid_flow_mm3_per_s",
+                width.len()
+            )),
+            _ => None,
+        };
+        ([width, flow], note)
+    }
+
+    /// When the nozzle first was at a place of the path \[s\].
+    fn passed(&self, place: f64) -> Option<f64> {
+        let after = self.path.values.partition_point(|path| *path < place);
+        let before = after.checked_sub(1)?;
+        let (from, to) = (*self.path.values.get(before)?, *self.path.values.get(after)?);
+        let (from_s, to_s) = (*self.path.time_s.get(before)?, *self.path.time_s.get(after)?);
+        Some(from_s + (to_s - from_s) * (place - from) / (to - from))
+    }
+
+    fn flow(&self, laid_s: f64, width: f64, height: Mm) -> Option<f64> {
+        let section = section(Mm::new(width).ok()?, height).ok()?;
+        let speed = MmPerS::new(self.speed.at(laid_s)?).ok()?;
+        Some((speed * section).get())
+    }
+}
+
+#[cfg(test)]
+mod tests;

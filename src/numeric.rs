@@ -1,0 +1,11 @@
+//! What a numerical library would hold: statistics, filters, linear systems, fits.
+
+pub mod blurred_step;
+pub mod hampel;
+pub mod lti;
+pub mod normal_distribution;
+pub mod normal_equations;
+pub mod number;
+pub mod rank;
+pub mod savgol;
+pub mod statistics;

@@ -1,0 +1,162 @@
+//! The blurred step that an edge is in a profile, tabulated: a step that is blurred by a
+//! Gaussian, as by a lens, and by a box, as by even motion while the shutter is open.
+//! Position is in standard deviations of the whole blur.
+
+use super::number::float;
+
+/// Half the table's reach, in standard deviations of the blur.
+const REACH: f64 = 6.0;
+/// Entries for each standard deviation.
+const PER_SD: f64 = 64.0;
+/// Fraction of the variance up to which a box is none.
+const NO_BOX: f64 = 1e-6;
+
+/// A blurred step at a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Entry {
+    /// Fraction of the step that is reached.
+    share: f64,
+    /// Its slope.
+    density: f64,
+    /// What the integral of the share up to here is beyond z times the share.
+    tail: f64,
+}
+
+/// Looks up a blurred step to about 1e-5 by interpolation.
+#[derive(Debug, Clone)]
+pub struct StepTable {
+    entries: Vec<Entry>,
+    box_fraction: f64,
+}
+
+impl Default for StepTable {
+    /// Blurred by a Gaussian alone.
+    fn default() -> Self {
+        Self::new(0.0)
+    }
+}
+
+impl StepTable {
+    /// Of a blur of which a box makes a fraction of the variance, from 0 to below 1.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "REACH and PER_SD are small and positive"
+    )]
+    pub fn new(box_fraction: f64) -> Self {
+        let count = (2.0 * REACH * PER_SD) as u32 + 2;
+        let place = |k: u32| f64::from(k) / PER_SD - REACH;
+        let entries = (0..count).map(|k| Entry::of(place(k), box_fraction)).collect();
+        Self { entries, box_fraction }
+    }
+
+    /// Fraction of the blur's variance that a box makes.
+    pub fn box_fraction(&self) -> f64 {
+        self.box_fraction
+    }
+
+    /// Share of the step and its slope.
+    #[inline]
+    pub fn at(&self, z: f64) -> (f64, f64) {
+        let entry = self.entry(z);
+        (entry.share, entry.density)
+    }
+
+    /// Share of the step, its slope, and the levels of two slopes that begin at the
+    /// step, blurred like it: one that falls towards it and one that rises after it.
+    #[inline]
+    pub fn with_slopes(&self, z: f64) -> (f64, f64, [f64; 2]) {
+        let Entry { share, density, tail } = self.entry(z);
+        (share, density, [tail - z * (1.0 - share), tail + z * share])
+    }
+
+    #[inline]
+    fn entry(&self, z: f64) -> Entry {
+        let place = (z + REACH) * PER_SD;
+        if place <= 0.0 {
+            return Entry { share: 0.0, density: 0.0, tail: 0.0 };
+        }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "positive here, and what is too large is beyond the table"
+        )]
+        let index = place as usize;
+        let (Some(low), Some(high)) = (self.entries.get(index), self.entries.get(index + 1)) else {
+            return Entry { share: 1.0, density: 0.0, tail: 0.0 };
+        };
+        let part = place - float(index);
+        let between = |low: f64, high: f64| low + part * (high - low);
+        Entry {
+            share: between(low.share, high.share),
+            density: between(low.density, high.density),
+            tail: between(low.tail, high.tail),
+        }
+    }
+}
+
+impl Entry {
+    fn of(z: f64, box_fraction: f64) -> Self {
+        if box_fraction < NO_BOX {
+            let (share, density) = gaussian(z);
+            return Self { share, density, tail: density };
+        }
+        // The integrals of a Gaussian's distribution function, once and twice, between
+        // the ends of the box.
+        let sd = (1.0 - box_fraction).sqrt();
+        let length = (12.0 * box_fraction).sqrt();
+        let [far, near] = [z + 0.5 * length, z - 0.5 * length].map(|end| {
+            let u = end / sd;
+            let (share, density) = gaussian(u);
+            let once = u * share + density;
+            let twice = 0.5 * ((u * u + 1.0) * share + u * density);
+            [share, sd * once, sd * sd * twice]
+        });
+        let [density, share, integral] = [0, 1, 2].map(|k| (far[k] - near[k]) / length);
+        Self { share, density, tail: integral - z * share }
+    }
+}
+
+fn gaussian(z: f64) -> (f64, f64) {
+    let step = 0.5 * (1.0 + libm::erf(z * std::f64::consts::FRAC_1_SQRT_2));
+    let density = (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
+    (step, density)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::numeric::blurred_step::*;
+
+    #[test]
+    fn the_table_is_the_function() {
+        let table = StepTable::default();
+        for k in -800..800 {
+            let z = f64::from(k) * 0.0101;
+            let (step, density) = table.at(z);
+            let (true_step, true_density) = gaussian(z);
+            assert!((step - true_step).abs() < 2e-5 && (density - true_density).abs() < 2e-5);
+        }
+    }
+
+    #[test]
+    fn a_box_leaves_a_ramp_of_its_length_and_a_variance_of_1() {
+        for fraction in [0.3, 0.8, 0.99] {
+            let table = StepTable::new(fraction);
+            let (mut sum, mut square, mut integral) = (0.0, 0.0, 0.0);
+            for k in -6000..6000 {
+                let z = (f64::from(k) + 0.5) / 1000.0;
+                let (share, density, [falling, rising]) = table.with_slopes(z);
+                sum += density / 1000.0;
+                square += z * z * density / 1000.0;
+                integral += share / 1000.0;
+                let upper = integral - share / 2000.0;
+                assert!((rising - upper).abs() < 1e-3, "{fraction} {z}: {rising} {upper}");
+                assert!((rising - falling - z).abs() < 1e-9);
+            }
+            assert!((sum - 1.0).abs() < 1e-4 && (square - 1.0).abs() < 1e-3, "{sum} {square}");
+            let ramp = 1.0 / (12.0 * fraction).sqrt();
+            let (half, density) = table.at(0.0);
+            assert!((half - 0.5).abs() < 1e-9 && density < 1.02 * ramp, "{density} {ramp}");
+        }
+    }
+}

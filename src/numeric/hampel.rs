@@ -1,0 +1,200 @@
+//! Outliers: the Hampel filter (bcs-thesis, eqs. (1)–(4)). A sample that lies
+//! further from the median of its window than so many scaled median absolute
+//! deviations is replaced by that median. (The thesis says *mean* absolute
+//! deviation in words; its eq. (4) is the median.)
+
+use super::rank;
+
+/// What makes a median absolute deviation the standard deviation of normal
+/// noise.
+const SCALE: f64 = 1.4826;
+/// Windows beyond this are no windows.
+const MAX_HALF_WIDTH: usize = 10_000;
+
+/// Numbers that make no filter.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum HampelError {
+    /// Half of the window.
+    #[error("a half width of {half_width} samples: expected 1 to {MAX_HALF_WIDTH}")]
+    HalfWidth {
+        /// What was asked for.
+        half_width: usize,
+    },
+    /// The threshold.
+    #[error("a threshold of {threshold}: expected a number of standard deviations, such as 3")]
+    Threshold {
+        /// What was asked for.
+        threshold: f64,
+    },
+}
+
+/// The filter's two numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hampel {
+    half_width: usize,
+    threshold: f64,
+}
+
+/// Samples without their outliers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cleaned {
+    /// As many as there were.
+    pub values: Vec<f64>,
+    /// Which ones were replaced, counted from 0.
+    pub replaced: Vec<usize>,
+}
+
+impl Hampel {
+    /// Window half width K in samples, threshold t in standard deviations.
+    pub fn new(half_width: usize, threshold: f64) -> Result<Self, HampelError> {
+        if !(1..=MAX_HALF_WIDTH).contains(&half_width) {
+            return Err(HampelError::HalfWidth { half_width });
+        }
+        if !(threshold >= 0.0 && threshold.is_finite()) {
+            return Err(HampelError::Threshold { threshold });
+        }
+        Ok(Self { half_width, threshold })
+    }
+
+    /// Looks K samples back and K ahead; at the ends the window is as long as
+    /// there are samples. What is not finite counts as an outlier.
+    pub fn filter(&self, samples: &[f64]) -> Cleaned {
+        let mut window = Vec::with_capacity(2 * self.half_width + 1);
+        let mut replaced = Vec::new();
+        let mut values = Vec::with_capacity(samples.len());
+        for (at, &sample) in samples.iter().enumerate() {
+            let from = at.saturating_sub(self.half_width);
+            let to = (at + self.half_width + 1).min(samples.len());
+            let seen = samples.get(from..to).unwrap_or_default().iter().copied();
+            let value = self.judge(sample, seen, &mut window);
+            if value.to_bits() != sample.to_bits() {
+                replaced.push(at);
+            }
+            values.push(value);
+        }
+        Cleaned { values, replaced }
+    }
+
+    /// The sample, or the median of its window. The scratch is kept from call
+    /// to call so that nothing is allocated.
+    fn judge(&self, sample: f64, seen: impl Iterator<Item = f64>, scratch: &mut Vec<f64>) -> f64 {
+        scratch.clear();
+        scratch.extend(seen.filter(|value| value.is_finite()));
+        let Some(middle) = median(scratch) else { return sample };
+        for value in scratch.iter_mut() {
+            *value = (*value - middle).abs();
+        }
+        let deviation = median(scratch).unwrap_or(0.0);
+        let is_inlier = (sample - middle).abs() <= self.threshold * SCALE * deviation;
+        if is_inlier { sample } else { middle }
+    }
+}
+
+/// The same for live use: the window is the newest 2K + 1 samples, of which the
+/// last one is judged. A change of level passes K samples late.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LiveHampel {
+    filter: Hampel,
+    ring: Vec<f64>,
+    next: usize,
+    scratch: Vec<f64>,
+}
+
+impl LiveHampel {
+    /// With an empty window.
+    pub fn new(filter: Hampel) -> Self {
+        let length = 2 * filter.half_width + 1;
+        let ring = Vec::with_capacity(length);
+        Self { filter, ring, next: 0, scratch: Vec::with_capacity(length) }
+    }
+
+    /// Takes a sample; gives it back, or the median in its place. One that is
+    /// not finite comes back as it is while none that is has been seen.
+    pub fn step(&mut self, sample: f64) -> f64 {
+        let length = 2 * self.filter.half_width + 1;
+        match self.ring.get_mut(self.next) {
+            Some(oldest) => *oldest = sample,
+            None => self.ring.push(sample),
+        }
+        self.next = (self.next + 1) % length;
+        self.filter.judge(sample, self.ring.iter().copied(), &mut self.scratch)
+    }
+}
+
+/// The middle value, or the mean of the two: windows at the ends may have an
+/// even number of samples.
+fn median(values: &mut [f64]) -> Option<f64> {
+    let count = values.len();
+    let upper = rank::median(values)?;
+    if count % 2 == 1 {
+        return Some(upper);
+    }
+    let lower = rank::at(values, (count / 2).checked_sub(1)?)?;
+    Some(f64::midpoint(lower, upper))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use crate::numeric::hampel::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_median_takes_an_outliers_place() {
+        // Window of the fourth: 1, 3, 90, 2, 4 with the median 3, deviations 2, 0, 87, 1, 1:
+        // scale 1.4826, so that 90 goes and its neighbours stay.
+        let cleaned = Hampel::new(2, 3.0).unwrap().filter(&[2.0, 1.0, 3.0, 90.0, 2.0, 4.0, 3.0]);
+        assert_eq!(cleaned.values, [2.0, 1.0, 3.0, 3.0, 2.0, 4.0, 3.0]);
+        assert_eq!(cleaned.replaced, [3]);
+    }
+
+    #[test]
+    fn the_threshold_counts_scaled_median_deviations() {
+        // Median 0, median absolute deviation 1, mean absolute deviation 1.44.
+        let at = |value: f64| [-1.0, -1.0, -1.0, 0.0, value, 0.0, 1.0, 1.0, 1.0];
+        let filter = Hampel::new(4, 2.0).unwrap();
+        let bound = 2.0 * 1.4826;
+        assert_eq!(filter.filter(&at(bound - 1e-9)).replaced, Vec::<usize>::new());
+        assert_eq!(filter.filter(&at(bound + 1e-9)).replaced, [4]);
+    }
+
+    #[test]
+    fn live_it_passes_a_step_late_and_a_spike_not_at_all() {
+        let mut live = LiveHampel::new(Hampel::new(2, 3.0).unwrap());
+        let mut samples: Vec<f64> = [0.0, 0.1, -0.1].repeat(5);
+        samples.extend([8.0, 0.1, 0.0, -0.1, 0.1]);
+        let passed: Vec<f64> = samples.iter().map(|sample| live.step(*sample)).collect();
+        assert!(passed.iter().all(|value| value.abs() < 0.2), "{passed:?}");
+        let after: Vec<f64> = [5.0, 5.1, 4.9, 5.0].iter().map(|v| live.step(*v)).collect();
+        assert!(after[0] < 1.0 && after[1] < 1.0 && after[2] > 4.0 && after[3] > 4.0, "{after:?}");
+    }
+
+    #[test]
+    fn what_is_not_finite_is_an_outlier() {
+        let cleaned =
+            Hampel::new(2, 3.0).unwrap().filter(&[1.0, f64::NAN, 1.2, f64::INFINITY, 1.1]);
+        assert!(cleaned.values.iter().all(|value| value.is_finite()), "{cleaned:?}");
+        assert_eq!(cleaned.replaced, [1, 3]);
+        let mut live = LiveHampel::new(Hampel::new(2, 3.0).unwrap());
+        assert!(live.step(f64::NAN).is_nan());
+        assert_eq!([live.step(2.0), live.step(f64::NAN)], [2.0, 2.0]);
+    }
+
+    #[test]
+    fn numbers_that_make_no_filter_are_refused() {
+        assert!(Hampel::new(0, 3.0).is_err());
+        assert!(Hampel::new(3, f64::NAN).is_err() && Hampel::new(3, -1.0).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn every_value_comes_from_its_window(samples in prop::collection::vec(-1e3..1e3, 1..60)) {
+            let cleaned = Hampel::new(3, 2.0).unwrap().filter(&samples);
+            prop_assert_eq!(cleaned.values.len(), samples.len());
+            let low = samples.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = samples.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            prop_assert!(cleaned.values.iter().all(|value| (low..=high).contains(value)));
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! Medians and other ranks of values in scratch memory, which is left in another
+//! order.
+
+use std::cmp::Ordering;
+
+/// Standard deviation of normal numbers over the median of their magnitudes.
+pub const SIGMA_PER_MEDIAN: f64 = 1.4826;
+
+/// Numbers that have an order.
+pub trait Ordered: Copy {
+    /// The total order of IEEE 754.
+    fn order(&self, other: &Self) -> Ordering;
+}
+
+impl Ordered for f32 {
+    fn order(&self, other: &Self) -> Ordering {
+        self.total_cmp(other)
+    }
+}
+
+impl Ordered for f64 {
+    fn order(&self, other: &Self) -> Ordering {
+        self.total_cmp(other)
+    }
+}
+
+/// The value that so many others do not exceed; `None` where there are no more
+/// than that.
+#[inline(always)]
+pub fn at<T: Ordered>(values: &mut [T], rank: usize) -> Option<T> {
+    (rank < values.len()).then(|| *values.select_nth_unstable_by(rank, T::order).1)
+}
+
+/// The middle one, of two the upper; `None` of none.
+#[inline(always)]
+pub fn median<T: Ordered>(values: &mut [T]) -> Option<T> {
+    let middle = values.len() / 2;
+    at(values, middle)
+}
+
+/// Median of how far values lie from `median`; their magnitudes are left in their place.
+/// `None` of none.
+#[inline(always)]
+pub fn median_deviation(values: &mut [f32], median: f32) -> Option<f32> {
+    for value in &mut *values {
+        *value = (*value - median).abs();
+    }
+    self::median(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::numeric::rank::*;
+
+    #[test]
+    fn ranks_are_those_of_the_sorted_values() {
+        let mut values = [5.0, -1.0, 3.0, 9.0];
+        assert_eq!(at(&mut values, 0), Some(-1.0));
+        assert_eq!(median(&mut values), Some(5.0));
+        assert_eq!(median(&mut values[..0]), None);
+        assert_eq!(at(&mut [1.0f32], 1), None);
+    }
+
+    #[test]
+    fn a_few_far_values_change_no_deviation() {
+        let mut values = [1.0, 2.0, 3.0, 4.0, 900.0];
+        assert_eq!(median_deviation(&mut values, 3.0), Some(1.0));
+        assert_eq!(median_deviation(&mut [], 0.0), None);
+    }
+}

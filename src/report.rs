@@ -1,0 +1,15 @@
+//! What people look at: pages, plots, overlays, boards to print.
+
+pub mod calibration;
+pub mod compare;
+pub mod identify;
+pub mod image;
+pub mod offset;
+pub mod overlays;
+pub mod picker;
+pub mod planned;
+pub mod run;
+pub mod sheet;
+#[cfg(test)]
+pub mod synthetic;
+pub mod tuned;

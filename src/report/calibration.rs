@@ -1,0 +1,204 @@
+//! `report.html` of a calibration: where boards were seen, what is left between seen
+//! and expected, and what a width is known to, all over the picture.
+
+pub mod cell;
+mod drawing;
+
+use maud::{Markup, html};
+
+use super::run::reloading_page;
+use crate::calibration::board::Board;
+use crate::calibration::map;
+use crate::calibration::map::WidthMap;
+use crate::calibration::next_view::NextView;
+use crate::calibration::quality;
+use crate::calibration::sighting::Looks;
+use crate::calibration::solve::Solution;
+use drawing::{Drawing, residuals, width_map};
+
+/// Everything that the page is made of.
+#[derive(Debug)]
+pub struct Page<'a> {
+    /// The board.
+    pub board: &'a Board,
+    /// What became of each picture.
+    pub looks: &'a Looks,
+    /// The camera.
+    pub solution: &'a Solution,
+    /// What a width is known to, a surface each; empty where that cannot be told.
+    pub maps: &'a [WidthMap],
+    /// The largest standard deviation that is allowed \[mm\].
+    pub limit_mm: Option<f64>,
+    /// What one more picture would bring.
+    pub next: Option<&'a NextView>,
+    /// The whole answer as text.
+    pub text: &'a str,
+    /// The calibration file.
+    pub calibration_file: &'a str,
+    /// Seconds after which the page loads itself anew, while pictures are still taken.
+    pub reload_s: Option<u32>,
+}
+
+impl Page<'_> {
+    /// The page.
+    pub fn page(&self) -> String {
+        let title = format!("Calibration {}", self.calibration_file);
+        let body = html! {
+            h1 { (title) }
+            (self.about())
+            (self.verdict())
+            (self.maps())
+            (self.coverage())
+            (self.views())
+            section { h2 { "The answer as text" } pre.wide { (self.text) } }
+            footer { "Written by truebead " (env!("CARGO_PKG_VERSION")) "." }
+        };
+        reloading_page(&title, self.reload_s, &body).into_string()
+    }
+
+    fn about(&self) -> Markup {
+        let (columns, rows) = self.board.corners();
+        let [width, height] = self.solution.image_size_px;
+        let model = self.solution.free.lens.map_or("none", |lens| lens.name());
+        let kind = if self.board.is_plain() { "board" } else { "ChArUco board" };
+        html! {
+            div.about {
+                span { (kind) " " b { (columns) "x" (rows) " corners, " (self.board.square()) } }
+                span { "pictures " b { (self.solution.views.len()) " of " (self.looks.len()) } }
+                span { "size " b { (width) "x" (height) " px" } }
+                span { "lens " b { (model) } }
+                span { "reprojection error " b { (format!("{:.3} px", self.solution.rms_px)) } }
+                @if let Some(px) = self.solution.held_out_px {
+                    span { "held out " b { (format!("{px:.3} px")) } }
+                }
+            }
+        }
+    }
+
+    fn verdict(&self) -> Markup {
+        let doubts = quality::doubts(self.solution);
+        let worst = map::worst_mm(self.maps);
+        let fails = self.limit_mm.is_some_and(|limit| worst.is_none_or(|worst| worst > limit));
+        let (class, word) = match (fails, worst, doubts.is_empty()) {
+            (true, ..) | (_, None, _) => ("bad", "Not good enough."),
+            (false, Some(_), false) => ("caution", "Look closer."),
+            (false, Some(_), true) => ("good", "Good."),
+        };
+        html! {
+            div class={ "verdict " (class) } {
+                b { (word) }
+                @match (worst, self.maps.first()) {
+                    (Some(worst), Some(map)) => {
+                        (format!(
+                            "The width of a bead of {} mm is known to {worst:.4} mm (one standard \
+                             deviation) or better where boards were seen", map.bead_mm
+                        ))
+                        @if let Some(limit) = self.limit_mm {
+                            (format!("; {limit} mm is allowed"))
+                        }
+                        "."
+                    }
+                    _ => "How well a width is known cannot be told from these pictures."
+                }
+                ul {
+                    @for doubt in &doubts { li { (doubt) } }
+                    @if let Some(next) = self.next {
+                        li {
+                            "One more picture would help most with " (next)
+                            (format!(
+                                ": {:.3} % of a width instead of {:.3} %.",
+                                100.0 * next.share.1, 100.0 * next.share.0
+                            ))
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn maps(&self) -> Markup {
+        html! {
+            @for map in self.maps {
+                section {
+                    h2 { "What a width is known to, " (map.surface_height) " above the bed" }
+                    p.hint {
+                        (format!(
+                            "Standard deviation of the width of a bead of {} mm [mm] whose middle is \
+                             in a cell, the larger one of a bead along the picture and one across it, \
+                             from the corners. Dashed: where boards were seen; beads that lie in it with both ends count for the number above. Empty \
+                             cells do not see such a bead whole. A height that is 1 mm wrong changes \
+                             it by {:.4} mm.",
+                            map.bead_mm, map.by_a_millimetre_of_height_mm
+                        ))
+                    }
+                    (width_map(self.solution, map))
+                }
+            }
+        }
+    }
+
+    fn coverage(&self) -> Markup {
+        let times = drawing::magnification(self.solution);
+        html! {
+            section {
+                h2 { "Where boards were seen, and what is left there" }
+                p.hint {
+                    "Each corner of each picture, with its way from where the model expects it, "
+                    (format!("drawn {times:.0} times as long. "))
+                    "Ways that point the same in one part of the picture are the lens's, ways that \
+                     point the same on one board are the board's or its motion's."
+                }
+                (residuals(self.solution, times))
+            }
+        }
+    }
+
+    fn views(&self) -> Markup {
+        let largest = self.solution.views.iter().map(|view| view.max_px).fold(0.0, f64::max);
+        html! {
+            section {
+                h2 { "Pictures" }
+                div.wide {
+                    table {
+                        tr {
+                            th { "image" } th.number { "corners" } th.number { "RMS [px]" }
+                            th.number { "largest [px]" } th.number { "tilt [°]" }
+                            th.number { "blur [px]" } th { "" }
+                        }
+                        @for (name, look) in self.looks { (self.view(name, look, largest)) }
+                    }
+                }
+            }
+        }
+    }
+
+    fn view(
+        &self,
+        name: &str,
+        look: &Result<crate::calibration::sighting::Sighting, crate::calibration::refusal::Refusal>,
+        largest: f64,
+    ) -> Markup {
+        let view = self.solution.views.iter().find(|view| view.name == name);
+        html! {
+            tr {
+                td { (name) }
+                @match (look, view) {
+                    (Ok(sighting), Some(view)) => {
+                        td.number { (view.corners.len()) }
+                        td.number { (format!("{:.3}", view.rms_px)) }
+                        td.number { (format!("{:.3}", view.max_px)) }
+                        td.number { (format!("{:.0}", quality::tilt_deg(view))) }
+                        td.number {
+                            @if let Some(focus) = sighting.focus {
+                                (format!("{:.1} × {:.1}", focus.along_rows_px, focus.along_columns_px))
+                            }
+                        }
+                        td { (Drawing::bar(view.rms_px / largest, view.max_px / largest)) }
+                    }
+                    (Err(refusal), _) => td colspan="6" { (refusal) },
+                    (Ok(_), None) => td colspan="6" { "not used" }
+                }
+            }
+        }
+    }
+}

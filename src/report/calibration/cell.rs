@@ -1,0 +1,69 @@
+//! A page that shows what a calibration leaves in the widths of a cell, with its gauge.
+
+use maud::html;
+
+use super::drawing::share_map;
+use crate::calibration::share_map::ShareMap;
+use crate::core::geometry::Roi;
+use crate::report::run::whole_page;
+
+/// What the page is made of.
+#[derive(Debug)]
+pub struct CellPage<'a> {
+    /// The cell file.
+    pub cell: &'a str,
+    /// Calibration and surface in words.
+    pub calibration: &'a str,
+    /// What is left open, over the image.
+    pub map: &'a ShareMap,
+    /// The gauge.
+    pub gauge: Roi,
+    /// What is left open in the middle of the gauge, as a share of the width.
+    pub in_gauge: Option<f64>,
+    /// First column and row, last column and row between which boards were seen \[px\].
+    pub seen_px: Option<[f64; 4]>,
+}
+
+impl CellPage<'_> {
+    /// The page.
+    pub fn page(&self) -> String {
+        let title = format!("Calibration of {}", self.cell);
+        let body = html! {
+            h1 { (title) }
+            div.about { span { "calibration " b { (self.calibration) } } }
+            section {
+                h2 { "What the calibration leaves in a width" }
+                p.hint {
+                    (format!(
+                        "Standard deviation of the width of a bead of {} mm [% of it] whose \
+                         middle is in a cell, at the cell's surface height. Every sigma_mm \
+                         contains it for its own width and place; it is one error, the same in \
+                         every frame. Solid: the gauge. Dashed: where boards were seen. Empty \
+                         cells do not see such a bead whole.",
+                        self.map.bead_mm
+                    ))
+                }
+                @if let Some(share) = self.in_gauge {
+                    p {
+                        (format!(
+                            "In the middle of the gauge: {:.3} %, or {:.4} mm.",
+                            100.0 * share,
+                            share * self.map.bead_mm
+                        ))
+                    }
+                }
+                (share_map(self.map, corners_px(self.gauge), self.seen_px))
+            }
+            footer { "Written by truebead " (env!("CARGO_PKG_VERSION")) "." }
+        };
+        whole_page(&title, &body).into_string()
+    }
+}
+
+/// First column and row, last column and row of a gauge, with the pixels' own width
+/// \[px\].
+#[expect(clippy::cast_precision_loss, reason = "pixels of an image")]
+fn corners_px(gauge: Roi) -> [f64; 4] {
+    let ends = [gauge.x, gauge.y, gauge.x + gauge.width, gauge.y + gauge.height];
+    ends.map(|px| px as f64 - 0.5)
+}

@@ -1,0 +1,150 @@
+//! `report.html` of a model.
+
+use maud::{Markup, html};
+
+use super::table::{independent, significant, transfer};
+use super::{Study, curves, form};
+use crate::report::run::palette::MODEL;
+use crate::report::run::sections::legend;
+use crate::report::run::whole_page;
+
+/// The page.
+pub fn page(study: &Study) -> String {
+    let logs = &study.logs;
+    let title = format!("Model {} → {}", logs.input, logs.output);
+    let body = html! {
+        h1 { (title) }
+        (about(study))
+        (verdict(study))
+        (parameters(study))
+        (compared(study))
+        section {
+            h2 { "What the model was fitted to" }
+            (curves::over_time(study, &logs.estimation, &study.fit.predicted))
+        }
+        @if let (Some((data, from)), Some(foretold)) = (&logs.validation, &study.foretold) {
+            section {
+                h2 { "What it was validated with" }
+                p.hint { (from) ", from " (format!("{:.2}", data.start_s)) " s on" }
+                (curves::over_time(study, data, foretold))
+            }
+        }
+        (answers(study))
+        (left(study))
+        footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))
+            ". The numbers are in identify.json, the model is in model.toml." }
+    };
+    whole_page(&title, &body).into_string()
+}
+
+fn about(study: &Study) -> Markup {
+    let data = &study.logs.estimation;
+    html! {
+        div.about {
+            span { "data " b { (study.logs.source) } }
+            span { "samples " b { (data.len()) } }
+            span { "rate " b { (format!("{:.2} Hz", 1.0 / data.step_s)) } }
+            span { "form " b { (form(study.fit.settings.structure)) } }
+        }
+    }
+}
+
+fn verdict(study: &Study) -> Markup {
+    let (class, word) =
+        if study.warnings.is_empty() { ("good", "Good.") } else { ("caution", "Look closer.") };
+    html! {
+        div class={ "verdict " (class) } {
+            b { (word) }
+            (format!("The model fits its own data to {:.1} %", study.fit.quality.fit_percent))
+            @match study.validation {
+                Some(other) => (format!(" and foretells other data to {:.1} %.", other.fit_percent)),
+                None => ".",
+            }
+            @if !study.warnings.is_empty() {
+                ul { @for warning in &study.warnings { li { (warning) } } }
+            }
+        }
+    }
+}
+
+fn parameters(study: &Study) -> Markup {
+    let fit = &study.fit;
+    html! {
+        section {
+            h2 { "The model" }
+            p.hint { code { (transfer(fit)) } }
+            div.wide { table {
+                thead { tr {
+                    th { "parameter" } th.number { "value" } th.number { "standard error" }
+                    th.number { "if the noise were white" } th { "unit" }
+                } }
+                tbody { @for one in &fit.parameters { tr {
+                    td { (one.name) }
+                    td.number { (significant(one.value)) }
+                    td.number { (significant(one.sigma)) }
+                    td.number { (significant(one.sigma_if_white)) }
+                    td { (study.unit_of(&one.name)) }
+                } } }
+            } }
+        }
+    }
+}
+
+fn compared(study: &Study) -> Markup {
+    let comparison = &study.comparison;
+    if comparison.rows.len() < 2 {
+        return html! {};
+    }
+    let number = |value: Option<f64>, places: usize| {
+        value.map_or_else(|| "–".to_owned(), |value| format!("{value:.places$}"))
+    };
+    html! {
+        section {
+            h2 { "Forms that were compared" }
+            p.hint { "Taken: " (form(study.fit.settings.structure)) ": " (comparison.reason) "." }
+            div.wide { table {
+                thead { tr {
+                    th { "form" } th.number { "parameters" } th.number { "fit [%]" }
+                    th.number { "validation [%]" } th.number { "BIC" } th { "" }
+                } }
+                tbody { @for row in &comparison.rows { tr {
+                    td { (form(row.settings.structure)) }
+                    @match &row.fit {
+                        Ok(fit) => {
+                            td.number { (fit.estimated) }
+                            td.number { (number(Some(fit.quality.fit_percent), 2)) }
+                            td.number { (number(row.validation.map(|q| q.fit_percent), 2)) }
+                            td.number { (number(row.bic, 1)) }
+                            td { @if !fit.is_determined() { "not determined by the data" } }
+                        }
+                        Err(why) => td colspan="5" { (why) },
+                    }
+                } } }
+            } }
+        }
+    }
+}
+
+fn answers(study: &Study) -> Markup {
+    html! {
+        section {
+            h2 { "How it answers" }
+            p.hint { "The bands are two standard deviations wide to either side; they come from the \
+                noise of the data, not from what the model leaves out." }
+            (legend(&[("model", MODEL, ""), ("± 2 standard deviations", MODEL, "area")]))
+            (curves::step(study))
+            (curves::bode(study))
+        }
+    }
+}
+
+fn left(study: &Study) -> Markup {
+    html! {
+        section {
+            h2 { "What it leaves" }
+            p.hint { (independent(&study.fit)) }
+            (curves::residuals(study))
+            (curves::autocorrelation(study))
+        }
+    }
+}

@@ -1,0 +1,203 @@
+//! A frame with the found edges drawn in, where they were found to a fraction
+//! of a pixel.
+
+mod canvas;
+
+use image::imageops::FilterType;
+
+use super::run::palette::{GAUGE, LEFT_EDGE, REJECTED, RIGHT_EDGE, Rgb};
+use crate::core::frame::Frame;
+use crate::core::geometry::{ImagePoint, Roi};
+use crate::vision::{Edges, Gauge, WidthMeasurement};
+use canvas::Canvas;
+
+/// Longest side of a picture \[px\].
+const SIDE: usize = 720;
+/// A small gauge is enlarged by at most this.
+const MAX_SCALE: f64 = 6.0;
+/// A picture whose brightest pixel is darker than this is brightened.
+const DARK: u8 = 110;
+const WHITE: Rgb = [255, 255, 255];
+const BLACK: Rgb = [0, 0, 0];
+
+/// The surroundings of the gauge, cut out of a frame, with what was found
+/// there. Of bounded size, whatever the camera.
+#[derive(Debug, Clone)]
+pub struct Snapshot {
+    /// Number of the frame.
+    pub frame: u64,
+    /// What was found, or why it was refused.
+    pub outcome: Result<WidthMeasurement, &'static str>,
+    cut: image::GrayImage,
+    /// Top left corner of the cut in the frame, and pixels of the cut for
+    /// each of the frame.
+    corner: (usize, usize),
+    scale: f64,
+    roi: Roi,
+    left: Vec<ImagePoint>,
+    right: Vec<ImagePoint>,
+}
+
+impl Snapshot {
+    /// Cuts a snapshot out of a frame.
+    pub fn take(
+        frame: &Frame,
+        gauge: &Gauge,
+        edges: Option<Edges<'_>>,
+        outcome: Result<WidthMeasurement, &'static str>,
+    ) -> Self {
+        let corner_and_size = surroundings(gauge.roi, frame.size());
+        let (cut, scale) = cut_out(frame, corner_and_size);
+        let points = |side: fn(Edges<'_>) -> &[ImagePoint]| {
+            edges.map(|edges| side(edges).to_vec()).unwrap_or_default()
+        };
+        Self {
+            frame: frame.seq,
+            outcome,
+            cut,
+            corner: corner_and_size.0,
+            scale,
+            roi: gauge.roi,
+            left: points(|edges| edges.left),
+            right: points(|edges| edges.right),
+        }
+    }
+
+    /// The drawing.
+    pub fn draw(&self) -> image::RgbImage {
+        let (width, height) = self.cut.dimensions();
+        let cut_side = f64::from(width.max(height));
+        #[expect(clippy::cast_precision_loss, reason = "a small constant")]
+        let enlarge = (SIDE as f64 / cut_side).clamp(1.0, MAX_SCALE).floor();
+        let size = |side: u32| whole(f64::from(side) * enlarge);
+        let grey =
+            image::imageops::resize(&self.cut, size(width), size(height), FilterType::Triangle);
+        let mut canvas = Canvas::new(&brightened(grey));
+        self.draw_gauge(&mut canvas, enlarge);
+        self.draw_edges(&mut canvas, enlarge);
+        canvas.into_image()
+    }
+
+    /// The drawing as a PNG; none if it cannot be encoded.
+    pub fn png(&self) -> Option<Vec<u8>> {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        self.draw().write_to(&mut bytes, image::ImageFormat::Png).ok()?;
+        Some(bytes.into_inner())
+    }
+
+    /// The drawing as a JPEG of this quality; none if it cannot be encoded.
+    pub fn jpeg(&self, quality: u8) -> Option<Vec<u8>> {
+        let mut bytes = Vec::new();
+        let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, quality);
+        encoder.encode_image(&self.draw()).ok()?;
+        Some(bytes)
+    }
+
+    /// From raw image pixels to pixels of the drawing. The borders of the
+    /// pixels fall together, not their centres.
+    fn place(&self, point: ImagePoint, enlarge: f64) -> (f64, f64) {
+        let scale = self.scale * enlarge;
+        let along = |value: f64, corner: usize| (value + 0.5 - as_f64(corner)) * scale - 0.5;
+        (along(point.x, self.corner.0), along(point.y, self.corner.1))
+    }
+
+    fn draw_gauge(&self, canvas: &mut Canvas, enlarge: f64) {
+        let (left, top) = (as_f64(self.roi.x) - 0.5, as_f64(self.roi.y) - 0.5);
+        let (right, bottom) = (left + as_f64(self.roi.width), top + as_f64(self.roi.height));
+        let colour = if self.outcome.is_ok() { GAUGE.light } else { REJECTED.light };
+        let corners = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
+            .map(|(x, y)| self.place(ImagePoint::new(x, y), enlarge));
+        for pair in corners.windows(2) {
+            canvas.dashes(pair[0], pair[1], 1.4, colour);
+        }
+    }
+
+    fn draw_edges(&self, canvas: &mut Canvas, enlarge: f64) {
+        let radius = (self.scale * enlarge * 0.8).clamp(2.0, 3.2);
+        for (points, ink) in [(&self.left, LEFT_EDGE), (&self.right, RIGHT_EDGE)] {
+            for point in points {
+                canvas.dot(self.place(*point, enlarge), radius, ink.light);
+            }
+        }
+        let Ok(measured) = &self.outcome else { return };
+        let left = self.place(measured.left, enlarge);
+        let right = self.place(measured.right, enlarge);
+        canvas.line(left, right, 2.6, BLACK);
+        canvas.line(left, right, 1.3, WHITE);
+        for (end, ink) in [(left, LEFT_EDGE), (right, RIGHT_EDGE)] {
+            canvas.dot(end, 7.5, BLACK);
+            canvas.dot(end, 6.0, ink.light);
+        }
+    }
+}
+
+/// A frame with the gauge, the edges and the width drawn in, cut to the
+/// surroundings of the gauge, as a PNG; none if it cannot be encoded.
+pub fn draw(
+    frame: &Frame,
+    gauge: &Gauge,
+    edges: Option<Edges<'_>>,
+    outcome: Result<WidthMeasurement, &'static str>,
+) -> Option<Vec<u8>> {
+    Snapshot::take(frame, gauge, edges, outcome).png()
+}
+
+/// The gauge and a margin around it, within the image: corner and size. The
+/// whole image where the gauge lies outside of it.
+fn surroundings(roi: Roi, (width, height): (usize, usize)) -> ((usize, usize), (usize, usize)) {
+    let margin = (roi.width.max(roi.height) / 12).max(8);
+    let along = |start: usize, length: usize, limit: usize| {
+        let from = start.saturating_sub(margin).min(limit);
+        (from, start.saturating_add(length).saturating_add(margin).min(limit) - from)
+    };
+    let ((x, w), (y, h)) = (along(roi.x, roi.width, width), along(roi.y, roi.height, height));
+    if w == 0 || h == 0 { ((0, 0), (width, height)) } else { ((x, y), (w, h)) }
+}
+
+type Cut = ((usize, usize), (usize, usize));
+
+/// Cuts out a part and makes it smaller if it is too large; tells the scale.
+fn cut_out(frame: &Frame, ((x, y), (width, height)): Cut) -> (image::GrayImage, f64) {
+    let grey = frame.to_grey8();
+    let rows = grey.chunks_exact(frame.width()).skip(y).take(height);
+    let pixels: Vec<u8> = rows.flat_map(|row| &row[x..x + width]).copied().collect();
+    let side = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
+    let cut = image::GrayImage::from_raw(side(width), side(height), pixels).unwrap_or_default();
+    if width.max(height) <= SIDE {
+        return (cut, 1.0);
+    }
+    let scale = as_f64(SIDE) / as_f64(width.max(height));
+    let smaller = |length: usize| whole(as_f64(length) * scale);
+    let small =
+        image::imageops::resize(&cut, smaller(width), smaller(height), FilterType::Triangle);
+    (small, scale)
+}
+
+/// A dark picture is of no use to a reader.
+fn brightened(mut grey: image::GrayImage) -> image::GrayImage {
+    let brightest = grey.pixels().map(|pixel| pixel.0[0]).max().unwrap_or(255);
+    if (1..DARK).contains(&brightest) {
+        for pixel in grey.pixels_mut() {
+            let value = u16::from(pixel.0[0]) * 255 / u16::from(brightest);
+            pixel.0[0] = u8::try_from(value).unwrap_or(u8::MAX);
+        }
+    }
+    grey
+}
+
+#[expect(clippy::cast_precision_loss, reason = "sides of an image are far below 2^52")]
+fn as_f64(length: usize) -> f64 {
+    length as f64
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a side of a picture, clamped from below"
+)]
+fn whole(length: f64) -> u32 {
+    length.round().max(1.0) as u32
+}
+
+#[cfg(test)]
+mod tests;

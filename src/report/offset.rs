@@ -1,0 +1,61 @@
+//! What a recording says of a bead: where the robot was, and the widths that were
+//! measured meanwhile.
+
+use crate::core::time::Stamp;
+use crate::identify::camera_offset::Width;
+use crate::io::recording::{Entry, RecordingError};
+use crate::width_control::{Event, RobotState};
+
+/// A bead as it was recorded.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Print {
+    /// What the robot reported, when it arrived.
+    pub states: Vec<(Stamp, RobotState)>,
+    /// Widths that were measured.
+    pub widths: Vec<Width>,
+    /// Frames that gave none.
+    pub refused: u64,
+}
+
+/// Reads a recording to its end. Fails where it cannot be read on.
+pub fn print(
+    entries: impl IntoIterator<Item = Result<Entry, RecordingError>>,
+) -> Result<Print, RecordingError> {
+    let mut print = Print::default();
+    for entry in entries {
+        let Entry::Event { now, event, .. } = entry? else { continue };
+        match event {
+            Event::Robot(state) => print.states.push((now, state)),
+            Event::Measured { captured_at, width_mm, sigma_mm, .. } => {
+                print.widths.push(Width { at: captured_at, width: width_mm, sigma: sigma_mm });
+            }
+            Event::Rejected { .. } => print.refused += 1,
+            _ => {}
+        }
+    }
+    // Time goes by capture, whatever came in between.
+    print.widths.sort_by_key(|width| width.at);
+    Ok(print)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::core::units::Mm;
+    use crate::report::offset::*;
+
+    #[test]
+    fn widths_are_put_in_the_order_of_their_frames() {
+        let measured = |n: u64, ms: u64| {
+            let captured_at = Stamp::from_ns(ms * 1_000_000);
+            let (width_mm, sigma_mm) = (Mm::constant(40.0), Mm::constant(0.1));
+            let event = Event::Measured { frame: n, captured_at, width_mm, sigma_mm };
+            Ok(Entry::Event { n, now: captured_at, event })
+        };
+        let refused =
+            Event::Rejected { frame: 2, captured_at: Stamp::START, reason: "no_pair".into() };
+        let refused = Ok(Entry::Event { n: 2, now: Stamp::START, event: refused });
+        let print = print([measured(0, 40), measured(1, 20), refused]).unwrap();
+        let times: Vec<u64> = print.widths.iter().map(|width| width.at.ns() / 1_000_000).collect();
+        assert_eq!((times, print.refused), (vec![20, 40], 1));
+    }
+}

@@ -1,0 +1,224 @@
+//! Chooses some frames for the report while they pass by: the first, the
+//! least sure, some refused ones, and a spread over the whole run.
+
+use super::image::Snapshot;
+use crate::core::frame::Frame;
+use crate::rows::frame_row::FrameRow;
+use crate::rows::names::spoken;
+use crate::vision::{Edges, Gauge};
+
+/// Most pictures in a report.
+const PICTURES: usize = 12;
+/// Refused frames among them, each for another reason.
+const REFUSED: usize = 4;
+/// Snapshots of the spread that are kept before every second is let go.
+const SPREAD: usize = 16;
+/// A frame replaces the least sure one only if it is clearly less sure, so
+/// that a slow drift does not copy every frame.
+const CLEARLY: f64 = 1.05;
+const JPEG_QUALITY: u8 = 82;
+
+/// A frame of the report.
+#[derive(Debug, Clone)]
+pub struct Chosen {
+    /// Its number.
+    pub frame: u64,
+    /// What it shows.
+    pub caption: String,
+    /// The drawing.
+    pub jpeg: Vec<u8>,
+}
+
+/// A snapshot with its time and why it was kept.
+#[derive(Debug, Clone)]
+struct Kept {
+    snapshot: Snapshot,
+    time_s: Option<f64>,
+    why: &'static str,
+}
+
+/// Keeps a bounded number of snapshots.
+#[derive(Debug)]
+pub struct FramePicker {
+    gauge: Gauge,
+    first: Option<Kept>,
+    least_sure: Option<(f64, Kept)>,
+    refused: Vec<Kept>,
+    spread: Vec<Kept>,
+    stride: u64,
+    measured: u64,
+}
+
+impl FramePicker {
+    /// For frames that are measured with this gauge.
+    pub fn new(gauge: Gauge) -> Self {
+        Self {
+            gauge,
+            first: None,
+            least_sure: None,
+            refused: Vec::new(),
+            spread: Vec::new(),
+            stride: 1,
+            measured: 0,
+        }
+    }
+
+    /// A frame that was looked at; most are let go at once.
+    pub fn offer(&mut self, row: &FrameRow, frame: &Frame, edges: Option<Edges<'_>>) {
+        let gauge = self.gauge;
+        let keep = |why| Kept {
+            snapshot: Snapshot::take(frame, &gauge, edges, row.outcome),
+            time_s: row.time_s,
+            why,
+        };
+        let measured = match &row.outcome {
+            Err(status) => {
+                let known = self.refused.iter().any(|kept| kept.snapshot.outcome == Err(*status));
+                if self.refused.len() < REFUSED && !known {
+                    self.refused.push(keep("refused"));
+                }
+                return;
+            }
+            Ok(measured) => measured,
+        };
+        if self.first.is_none() {
+            self.first = Some(keep("first"));
+        }
+        let sigma = measured.sigma.get();
+        if self.least_sure.as_ref().is_none_or(|(most, _)| sigma > most * CLEARLY) {
+            self.least_sure = Some((sigma, keep("least sure")));
+        }
+        if self.measured.is_multiple_of(self.stride) {
+            self.spread.push(keep(""));
+        }
+        self.measured += 1;
+        if self.spread.len() > SPREAD {
+            let mut index = 0;
+            self.spread.retain(|_| {
+                index += 1;
+                index % 2 == 1
+            });
+            self.stride *= 2;
+        }
+    }
+
+    /// The chosen frames in their order, drawn.
+    pub fn finish(self) -> Vec<Chosen> {
+        let mut chosen: Vec<Kept> = self.refused;
+        chosen.extend(self.first);
+        let least_sure = self.least_sure.map(|(_, kept)| kept);
+        if let Some(kept) = least_sure.filter(|kept| is_new(&chosen, kept)) {
+            chosen.push(kept);
+        }
+        let room = PICTURES.saturating_sub(chosen.len());
+        let mut spread = self.spread;
+        spread.retain(|kept| is_new(&chosen, kept));
+        for index in evenly(spread.len(), room) {
+            chosen.push(spread[index].clone());
+        }
+        chosen.sort_by_key(|kept| kept.snapshot.frame);
+        chosen.iter().filter_map(draw).collect()
+    }
+}
+
+/// A frame is not shown twice.
+fn is_new(chosen: &[Kept], kept: &Kept) -> bool {
+    chosen.iter().all(|other| other.snapshot.frame != kept.snapshot.frame)
+}
+
+/// `wanted` of `count` indices, evenly spaced, the last among them.
+fn evenly(count: usize, wanted: usize) -> Vec<usize> {
+    let wanted = wanted.min(count);
+    (1..=wanted).map(|part| part * count / wanted - 1).collect()
+}
+
+fn draw(kept: &Kept) -> Option<Chosen> {
+    let mut parts = Vec::new();
+    if let Some(time_s) = kept.time_s {
+        parts.push(format!("{time_s:.2} s"));
+    }
+    match &kept.snapshot.outcome {
+        Ok(measured) => {
+            parts.push(format!("{:.3} ± {:.3} mm", measured.width.get(), measured.sigma.get()));
+        }
+        Err(status) => parts.push(format!("refused: {}", spoken(status))),
+    }
+    if kept.snapshot.outcome.is_ok() && !kept.why.is_empty() {
+        parts.push(kept.why.to_string());
+    }
+    Some(Chosen {
+        frame: kept.snapshot.frame,
+        caption: parts.join(" · "),
+        jpeg: kept.snapshot.jpeg(JPEG_QUALITY)?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::core::frame::Pixels;
+    use crate::core::geometry::Roi;
+    use crate::core::time::Stamp;
+    use crate::core::units::Mm;
+    use crate::report::picker::*;
+    use crate::rows::frame_row::sample;
+    use crate::vision::{Axis, Polarity};
+
+    fn picker() -> FramePicker {
+        FramePicker::new(Gauge {
+            calipers: 8,
+            ..Gauge::new(
+                Roi { x: 4, y: 4, width: 24, height: 16 },
+                Axis::Vertical,
+                Polarity::Any,
+                (Mm::constant(1.0), Mm::constant(100.0)),
+            )
+        })
+    }
+
+    fn offer(picker: &mut FramePicker, seq: u64, outcome: Result<f64, &'static str>) {
+        let frame =
+            Frame::new(seq, Stamp::START, (32, 24), Pixels::Grey8(vec![90; 32 * 24])).unwrap();
+        let row = FrameRow {
+            frame: seq,
+            time_s: None,
+            outcome: outcome.map(|sigma| sample::measured(42.0, sigma)),
+            roughness: None,
+            control: None,
+        };
+        picker.offer(&row, &frame, None);
+    }
+
+    #[test]
+    fn a_long_run_is_shown_from_end_to_end() {
+        let mut picker = picker();
+        for seq in 0..3000 {
+            let outcome = match seq {
+                700..710 => Err("no_pair"),
+                1500 => Err("saturated"),
+                1234 => Ok(0.5),
+                _ => Ok(0.02),
+            };
+            offer(&mut picker, seq, outcome);
+        }
+        assert!(picker.spread.len() <= SPREAD);
+        let chosen = picker.finish();
+        let frames: Vec<u64> = chosen.iter().map(|chosen| chosen.frame).collect();
+        assert!(frames.len() <= PICTURES && frames.len() >= 8, "{frames:?}");
+        for frame in [0, 700, 1234, 1500] {
+            assert!(frames.contains(&frame), "{frames:?}");
+        }
+        assert!(*frames.last().unwrap() > 2500, "{frames:?}");
+        assert!(frames.windows(2).all(|pair| pair[0] < pair[1]));
+        let refused = chosen.iter().find(|chosen| chosen.frame == 700).unwrap();
+        assert_eq!(refused.caption, "refused: no pair");
+    }
+
+    #[test]
+    fn a_run_of_one_frame_shows_it_once() {
+        let mut picker = picker();
+        offer(&mut picker, 0, Ok(0.02));
+        let chosen = picker.finish();
+        assert_eq!(chosen.len(), 1);
+        assert_eq!(chosen[0].caption, "42.000 ± 0.020 mm · first");
+    }
+}

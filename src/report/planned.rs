@@ -1,0 +1,61 @@
+//! What `truebead plan` leaves behind: `plan.csv` and a page.
+
+mod page;
+mod table;
+mod verdict;
+
+pub use page::page;
+pub use table::to_csv;
+
+use crate::core::quantity::Unit;
+use crate::plan::{Foretold, Plan, SpeedProfile};
+
+/// A bead of a job, planned.
+#[derive(Debug)]
+pub struct PlannedBead {
+    /// What it is called, such as `line 3`; its place where nothing names it.
+    pub name: String,
+    /// The speed without a plan, as fast as the robot's acceleration allows.
+    pub nominal: SpeedProfile,
+    /// Path and position \[mm\], in order.
+    pub position: Vec<(f64, [f64; 3])>,
+    /// The plan, with commands that count from [`Facts::idle`].
+    pub plan: Plan,
+    /// What comes of it.
+    pub planned: Foretold,
+    /// What comes of the nominal speed with a constant command.
+    pub constant: Foretold,
+    /// What comes of it with a command in proportion to the speed.
+    pub proportional: Foretold,
+}
+
+/// What is the same for all beads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Facts {
+    /// Width that is wanted \[mm\].
+    pub width_mm: f64,
+    /// Section that is wanted \[mm²\].
+    pub area_mm2: f64,
+    /// Command at which the model has no flow, in its unit.
+    pub idle: f64,
+    /// What is commanded.
+    pub unit: Unit,
+}
+
+impl PlannedBead {
+    /// Path length \[mm\].
+    pub fn length_mm(&self) -> f64 {
+        self.nominal.end_mm() - self.nominal.start_mm()
+    }
+}
+
+/// Root mean square of the width's error over beads, as a share of the width.
+pub fn rms<'a>(
+    beads: impl IntoIterator<Item = &'a PlannedBead>,
+    of: fn(&PlannedBead) -> &Foretold,
+) -> f64 {
+    let all = beads.into_iter().flat_map(|bead| of(bead).width.iter());
+    let (sum, count) =
+        all.fold((0.0, 0.0), |(sum, count), (_, share)| (sum + share * share, count + 1.0));
+    if count > 0.0 { f64::sqrt(sum / count) } else { 0.0 }
+}

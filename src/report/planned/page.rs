@@ -1,0 +1,133 @@
+//! The page of a plan.
+
+use maud::{Markup, html};
+
+use super::verdict::verdict;
+use super::{Facts, PlannedBead, rms};
+use crate::plan::{Foretold, SpeedProfile};
+use crate::report::run::area::{Area, XAxis};
+use crate::report::run::legend::legend;
+use crate::report::run::palette;
+use crate::report::run::palette::Ink;
+use crate::report::run::plot::{Layer, Plot, y_range};
+use crate::report::run::series::Series;
+use crate::report::run::whole_page;
+
+/// Beads that are drawn; of more, those with the largest errors.
+const DRAWN: usize = 12;
+/// Points of a curve over path.
+const POINTS: u32 = 2000;
+
+/// A curve, its name, its colour and whether it is only wished for.
+type Curve = (Series, &'static str, Ink, bool);
+
+/// The page, with names and values under its title, and with warnings.
+pub fn page(
+    beads: &[PlannedBead],
+    facts: &Facts,
+    about: &[(String, String)],
+    warnings: &[String],
+) -> String {
+    let mut drawn: Vec<&PlannedBead> = beads.iter().collect();
+    if drawn.len() > DRAWN {
+        let error = |bead: &PlannedBead| rms([bead], |bead| &bead.planned);
+        drawn.sort_by(|a, b| error(b).total_cmp(&error(a)));
+        drawn.truncate(DRAWN);
+    }
+    let body = html! {
+        h1 { "A job that is planned ahead" }
+        div.about { @for (name, value) in about { span { (name) " " b { (value) } } } }
+        (verdict(beads, facts, warnings))
+        @if drawn.len() < beads.len() {
+            p.hint { "Of " (beads.len()) " beads the " (DRAWN) " with the largest errors are drawn." }
+        }
+        @for bead in drawn { (section(bead, facts)) }
+        footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))
+            ". Every moment of the plan is in plan.csv." }
+    };
+    whole_page("A job that is planned ahead", &body).into_string()
+}
+
+fn section(bead: &PlannedBead, facts: &Facts) -> Markup {
+    let path = XAxis::path((bead.nominal.start_mm(), bead.nominal.end_mm()));
+    let speed = &bead.plan.speed;
+    let at_time = |of: &dyn Fn(f64) -> f64| along(speed, |path_mm| of(speed.time_at(path_mm)));
+    let speeds = [
+        (along(&bead.nominal, |s| bead.nominal.speed_at(s)), "nominal", palette::DEMAND, true),
+        (along(speed, |s| speed.speed_at(s)), "planned", palette::SPEED, false),
+    ];
+    let wanted = |path_mm: f64| speed.speed_at(path_mm) * facts.area_mm2;
+    let flows = [
+        (along(speed, wanted), "what the planned speed takes", palette::DEMAND, true),
+        (at_time(&|t| bead.planned.flow_at(t)), "foretold", palette::FLOW, false),
+    ];
+    let command = at_time(&|t| bead.plan.command_at(t) + facts.idle);
+    let commands = [(command, "command", palette::SCREW, false)];
+    let width = |of: &Foretold| widths_about(facts.width_mm, of, facts);
+    let widths = [
+        (
+            width(&bead.proportional),
+            "not planned, in proportion to the speed",
+            palette::HOLDING,
+            false,
+        ),
+        (width(&bead.constant), "not planned, constant command", palette::PAPER, false),
+        (width(&bead.planned), "planned", palette::OURS, false),
+    ];
+    let planned = [(widths_about(0.0, &bead.planned, facts), "planned", palette::OURS, false)];
+    html! {
+        section {
+            h2 { (bead.name) }
+            p.hint { "Foretold from the model, as the mean over the nozzle's length; what no model \
+                tells comes on top. Dips of the speed a nozzle's length apart count on that length; \
+                a larger --nozzle-doubt has fewer of them." }
+            (plot("width [mm]", &path, &widths, Some(facts.width_mm)))
+            (plot("width error [mm]", &path, &planned, Some(0.0)))
+            (plot("speed [mm/s]", &path, &speeds, None))
+            (plot("flow [mm³/s]", &path, &flows, None))
+            (plot(&format!("command [{}]", facts.unit), &path, &commands, None))
+        }
+    }
+}
+
+/// The width over path as it strays about a value \[mm\].
+fn widths_about(middle_mm: f64, of: &Foretold, facts: &Facts) -> Series {
+    let mut series = Series::default();
+    for (at, share) in &of.width {
+        series.push(*at, middle_mm + facts.width_mm * share);
+    }
+    series
+}
+
+/// A value along the path of a speed.
+fn along(speed: &SpeedProfile, of: impl Fn(f64) -> f64) -> Series {
+    let (start, length) = (speed.start_mm(), speed.end_mm() - speed.start_mm());
+    let even = (0..=POINTS).map(|k| start + length * f64::from(k) / f64::from(POINTS));
+    // The nodes as well, so that no apex lies between two points.
+    let mut places: Vec<f64> = even.chain(speed.path().iter().copied()).collect();
+    places.sort_by(f64::total_cmp);
+    let mut series = Series::default();
+    for place in places {
+        series.push(place, of(place));
+    }
+    series
+}
+
+fn plot(y_title: &str, x: &XAxis, curves: &[Curve], target: Option<f64>) -> Markup {
+    let shown: Vec<&Series> = curves.iter().map(|curve| &curve.0).collect();
+    let levels: Vec<f64> = target.into_iter().collect();
+    let mut layers: Vec<Layer<'_>> =
+        levels.iter().map(|level| Layer::Level(*level, palette::TARGET, "")).collect();
+    layers.extend(curves.iter().map(|(series, _, ink, wish)| {
+        if *wish { Layer::Wish(series, *ink) } else { Layer::Curve(series, *ink) }
+    }));
+    let mut names: Vec<(&str, Ink, &str)> = curves
+        .iter()
+        .map(|(_, name, ink, wish)| (*name, *ink, if *wish { "dash" } else { "" }))
+        .collect();
+    names.extend(levels.iter().map(|_| ("target", palette::TARGET, "dash")));
+    html! {
+        (legend(&names))
+        (Plot { area: Area::wide(220.0), x, y_title, y_range: y_range(&shown, &levels), layers }.draw())
+    }
+}

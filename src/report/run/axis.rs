@@ -1,0 +1,151 @@
+//! Axes: round ticks, and from values to places on the page.
+
+/// A linear or logarithmic map from values to a stretch of the page.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    low: f64,
+    high: f64,
+    from: f64,
+    to: f64,
+    log: bool,
+}
+
+impl Scale {
+    /// Values `low..=high` onto `from..=to`. A range without extent is widened.
+    pub fn linear((low, high): (f64, f64), (from, to): (f64, f64)) -> Self {
+        let (low, high) = widened(low, high);
+        Self { low, high, from, to, log: false }
+    }
+
+    /// The same for positive values on a logarithmic axis.
+    pub fn log((low, high): (f64, f64), (from, to): (f64, f64)) -> Self {
+        let low = low.max(1e-9);
+        let high = if high > low { high } else { low * 2.0 };
+        Self { low, high, from, to, log: true }
+    }
+
+    /// The place of a value on the page.
+    pub fn place(&self, value: f64) -> f64 {
+        let share = if self.log {
+            (value.max(1e-9) / self.low).ln() / (self.high / self.low).ln()
+        } else {
+            (value - self.low) / (self.high - self.low)
+        };
+        self.from + share * (self.to - self.from)
+    }
+
+    /// Smallest and largest value.
+    pub fn range(&self) -> (f64, f64) {
+        (self.low, self.high)
+    }
+
+    /// Round values within the range, about `wanted` of them, with their
+    /// labels.
+    pub fn ticks(&self, wanted: u32) -> Vec<(f64, String)> {
+        if self.log { self.log_ticks() } else { self.linear_ticks(wanted) }
+    }
+
+    fn linear_ticks(&self, wanted: u32) -> Vec<(f64, String)> {
+        let step = round_step((self.high - self.low) / f64::from(wanted.max(1)));
+        let places = places(step);
+        let mut ticks = Vec::new();
+        let mut index = (self.low / step - 1e-9).ceil();
+        while index * step <= self.high + step * 1e-9 && ticks.len() < 100 {
+            // Adding zero turns a negative zero into a positive one.
+            let value = index * step + 0.0;
+            ticks.push((value, format!("{value:.places$}")));
+            index += 1.0;
+        }
+        ticks
+    }
+
+    fn log_ticks(&self) -> Vec<(f64, String)> {
+        let factors: &[f64] = match self.high / self.low {
+            narrow if narrow < 10.0 => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0],
+            wide if wide < 1e3 => &[1.0, 2.0, 5.0],
+            _ => &[1.0],
+        };
+        let mut ticks = Vec::new();
+        let mut decade = 10_f64.powf(self.low.log10().floor());
+        while decade <= self.high && ticks.len() < 100 {
+            for factor in factors {
+                let value = decade * factor;
+                if (self.low..=self.high).contains(&value) {
+                    let halves = usize::from(factor.fract() > 0.0);
+                    ticks.push((value, format!("{value:.*}", places(value) + halves)));
+                }
+            }
+            decade *= 10.0;
+        }
+        ticks
+    }
+}
+
+/// A range with a margin of this share of its extent on both sides.
+pub fn with_margin((low, high): (f64, f64), share: f64) -> (f64, f64) {
+    let margin = (high - low) * share;
+    (low - margin, high + margin)
+}
+
+fn widened(low: f64, high: f64) -> (f64, f64) {
+    let least = (low.abs().max(high.abs()) * 1e-6).max(1e-6);
+    if high - low > least {
+        (low, high)
+    } else {
+        let middle = f64::midpoint(low, high);
+        let half = (middle.abs() * 0.01).max(0.5);
+        (middle - half, middle + half)
+    }
+}
+
+/// 1, 2 or 5 times a power of ten, not below `rough`.
+fn round_step(rough: f64) -> f64 {
+    let power = 10_f64.powf(rough.max(1e-12).log10().floor());
+    let factor = rough / power;
+    let round = [1.0, 2.0, 5.0].into_iter().find(|round| factor <= round + 1e-9);
+    power * round.unwrap_or(10.0)
+}
+
+/// Decimals that a step of this size needs.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=9")]
+fn places(step: f64) -> usize {
+    (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::report::run::axis::*;
+
+    fn labels(scale: Scale, wanted: u32) -> Vec<String> {
+        scale.ticks(wanted).into_iter().map(|tick| tick.1).collect()
+    }
+
+    #[test]
+    fn ticks_are_round() {
+        let page = (0.0, 100.0);
+        assert_eq!(labels(Scale::linear((0.0, 20.0), page), 5), ["0", "5", "10", "15", "20"]);
+        assert_eq!(
+            labels(Scale::linear((41.83, 42.21), page), 4),
+            ["41.9", "42.0", "42.1", "42.2"]
+        );
+        assert_eq!(labels(Scale::linear((-0.5, 0.5), page), 2), ["-0.5", "0.0", "0.5"]);
+        assert_eq!(labels(Scale::log((0.3, 6.0), page), 5), ["0.5", "1", "2", "5"]);
+        assert_eq!(labels(Scale::log((0.9, 3.1), page), 5), ["1", "1.5", "2", "3"]);
+    }
+
+    #[test]
+    fn a_range_without_extent_still_has_an_axis() {
+        let scale = Scale::linear((42.0, 42.0), (0.0, 100.0));
+        assert!((scale.place(42.0) - 50.0).abs() < 1e-9);
+        assert!(!scale.ticks(5).is_empty());
+        assert!(!Scale::log((0.0, 0.0), (0.0, 1.0)).place(0.0).is_nan());
+    }
+
+    #[test]
+    fn values_have_their_place() {
+        let scale = Scale::linear((0.0, 10.0), (200.0, 100.0));
+        assert!((scale.place(2.5) - 175.0).abs() < 1e-9);
+        let log = Scale::log((1.0, 100.0), (0.0, 100.0));
+        assert!((log.place(10.0) - 50.0).abs() < 1e-9);
+    }
+}

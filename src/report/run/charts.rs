@@ -1,0 +1,141 @@
+//! What the plots are drawn from, gathered one fact at a time in bounded
+//! memory.
+
+use super::distance::DistanceCharts;
+use super::extruder::ExtruderCharts;
+use super::series::Series;
+use super::strip::{Mark, Strip};
+use crate::core::time::Stamp;
+use crate::core::units::MmPerS;
+use crate::rows::frame_row::FrameRow;
+use crate::rows::names;
+use crate::rows::summary::Follower;
+use crate::width_control::{Event, State, Step};
+
+/// A quantity over time (or frames) and over path.
+#[derive(Debug, Default)]
+pub struct Twice {
+    /// Over time, or over frames where no time is known.
+    pub time: Series,
+    /// Over the distance along the path.
+    pub path: Series,
+}
+
+impl Twice {
+    fn push(&mut self, time: f64, path: Option<f64>, value: f64) {
+        self.time.push(time, value);
+        if let Some(path) = path {
+            self.path.push(path, value);
+        }
+    }
+}
+
+/// Everything that is plotted.
+#[derive(Debug, Default)]
+pub struct Charts {
+    /// Whether x is time; else it is the frame's number. Decided by the first
+    /// frame.
+    pub timed: Option<bool>,
+    /// Measured width.
+    pub width: Twice,
+    /// Width less two standard deviations.
+    pub width_low: Twice,
+    /// Width plus two standard deviations.
+    pub width_high: Twice,
+    /// Width that was asked for there.
+    pub target: Twice,
+    /// Speed that the robot reports.
+    pub speed: Twice,
+    /// Setpoints.
+    pub setpoint: Twice,
+    /// What the controller would like.
+    pub demand: Twice,
+    /// Contrast hint.
+    pub contrast: Series,
+    /// Blur hint.
+    pub blur: Series,
+    /// Noise hint.
+    pub noise: Series,
+    /// Share of saturated pixels \[%\].
+    pub saturated: Series,
+    /// Share of the rows that the width comes from \[%\].
+    pub used: Series,
+    /// Standard deviation of the width \[mm\].
+    pub sigma: Series,
+    /// Refused frames.
+    pub refused: Strip,
+    /// States of the controller.
+    pub states: Strip,
+    /// Limits that acted.
+    pub limits: Strip,
+    /// The law by distance.
+    pub distance: DistanceCharts,
+    /// The extruder side.
+    pub extruder: ExtruderCharts,
+    follower: Follower,
+}
+
+impl Charts {
+    /// A frame that was looked at.
+    pub fn frame(&mut self, row: &FrameRow) {
+        let timed = *self.timed.get_or_insert(row.time_s.is_some());
+        let x =
+            if timed { row.time_s } else { Some(crate::numeric::statistics::as_f64(row.frame)) };
+        let Some(x) = x else { return };
+        let measured = match &row.outcome {
+            Err(status) => return self.refused.push(x, Mark { severity: 1, name: status }),
+            Ok(measured) => measured,
+        };
+        self.refused.push(x, Mark { severity: 0, name: "ok" });
+        let path = row.control.and_then(|control| control.bead_path).map(f64::from);
+        let (width, sigma) = (measured.width.get(), measured.sigma.get());
+        self.width.push(x, path, width);
+        self.width_low.push(x, path, width - 2.0 * sigma);
+        self.width_high.push(x, path, width + 2.0 * sigma);
+        if let Some(target) = row.control.and_then(|control| control.target) {
+            self.target.push(x, path, target.get());
+        }
+        self.contrast.push(x, measured.hints.contrast_grey);
+        self.blur.push(x, measured.hints.blur_px);
+        self.noise.push(x, measured.hints.noise_grey);
+        self.saturated.push(x, measured.hints.saturated_share * 100.0);
+        self.used.push(x, measured.hints.used_share * 100.0);
+        self.sigma.push(x, sigma);
+    }
+
+    /// A step of the controller.
+    pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
+        self.timed.get_or_insert(true);
+        self.extruder.step(now, event, step);
+        self.distance.step(step);
+        let time = now.secs();
+        let before = self.follower.setpoint();
+        let _ = self.follower.step(now, event, step);
+        let path = self.follower.path().map(f64::from);
+        if let Event::Robot(robot) = event {
+            self.speed.push(time, path, robot.speed_mm_per_s.get());
+        }
+        if let Some(setpoint) = self.follower.setpoint()
+            && (step.command.is_some() || before != Some(setpoint))
+        {
+            self.setpoint.push(time, path, setpoint.get());
+        }
+        if let Some(demand) = step.trace.demand_mm_per_s {
+            self.demand.push(time, path, MmPerS::get(demand));
+        }
+        self.states.push(time, state_mark(self.follower.state()));
+        let limit = names::limit(self.follower.limit());
+        self.limits.push(time, Mark { severity: u8::from(limit != "none"), name: limit });
+    }
+}
+
+fn state_mark(state: &State) -> Mark {
+    let severity = match state {
+        State::Idle => 0,
+        State::Tracking => 1,
+        State::Priming => 2,
+        State::Holding(_) => 3,
+        State::Fault(_) => 4,
+    };
+    Mark { severity, name: state.name() }
+}

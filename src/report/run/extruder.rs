@@ -1,0 +1,207 @@
+//! The extruder side of a run: what was wanted of the nozzle, what it was told,
+//! and what its sensors said.
+
+use maud::{Markup, html};
+
+use super::area::{Area, XAxis};
+use super::legend;
+use super::palette;
+use super::palette::Ink;
+use super::plot::{Layer, Plot, y_range};
+use super::series::Series;
+use super::strip::{Mark, Strip};
+use super::strips;
+use super::strips::Row;
+use crate::core::time::Stamp;
+use crate::core::units::Mm3PerS;
+use crate::extruder::{Drive, ExtruderReport, ExtruderState};
+use crate::rows::names;
+use crate::rows::summary::ExtruderSummary;
+use crate::width_control::{Event, Step};
+
+/// The states of the extruder side.
+const STATES: [&str; 6] = ["off", "starting", "running", "ending", "holding", "fault"];
+
+/// What the plots of the extruder side are drawn from.
+#[derive(Debug, Default)]
+pub struct ExtruderCharts {
+    wanted: Series,
+    foretold: Series,
+    flow: Series,
+    sensed_flow: Series,
+    command: Series,
+    feedforward: Series,
+    screw: Series,
+    pressure: Series,
+    filled: Series,
+    states: Strip,
+    limits: Strip,
+}
+
+impl ExtruderCharts {
+    /// A step of the controller.
+    pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
+        let time = now.secs();
+        if let Event::Extruder(report) = event {
+            self.report(time, report);
+        }
+        let Some(side) = &step.extruder else { return };
+        let severity = match side.state {
+            ExtruderState::Off => 0,
+            ExtruderState::Running => 1,
+            ExtruderState::Starting | ExtruderState::Ending => 2,
+            ExtruderState::Holding(_) => 3,
+            ExtruderState::Fault(_) => 4,
+        };
+        self.states.push(time, Mark { severity, name: side.state.name() });
+        let limit = names::command_limit(side.trace.limit);
+        self.limits.push(time, Mark { severity: u8::from(limit != "none"), name: limit });
+        if let Some(command) = side.command {
+            self.command.push(time, command.value);
+            self.wanted.push(time, side.trace.flow_mm3_per_s.get());
+            self.feedforward.push(time, side.trace.feedforward);
+            if let Some(foretold) = side.trace.foretold_mm3_per_s {
+                self.foretold.push(time, foretold.get());
+            }
+        }
+    }
+
+    /// The true flow, where a simulation knows it.
+    pub fn flow(&mut self, now: Stamp, flow: Mm3PerS) {
+        self.flow.push(now.secs(), flow.get());
+    }
+
+    fn report(&mut self, time: f64, report: &ExtruderReport) {
+        let push = |series: &mut Series, value: Option<f64>| {
+            if let Some(value) = value {
+                series.push(time, value);
+            }
+        };
+        push(&mut self.screw, report.screw_rpm.map(f64::from));
+        push(&mut self.sensed_flow, report.flow_mm3_per_s.map(f64::from));
+        push(&mut self.pressure, report.pressure_mpa.map(f64::from));
+        push(&mut self.filled, report.filled_mm.map(f64::from));
+    }
+
+    /// The section of the page, for an extruder that is told this drive.
+    pub fn section(&self, drive: Drive, summary: Option<&ExtruderSummary>) -> Markup {
+        let Some(range) = self.command.extent() else { return html! {} };
+        let axis = XAxis::time(range);
+        let told = format!("command [{}]", drive.unit());
+        html! {
+            section {
+                h2 { "The extruder" }
+                (self.flow_plot(&axis))
+                (strips::draw(&axis, &[
+                    Row { name: "state", strip: &self.states, ink: palette::state },
+                    Row { name: "limit", strip: &self.limits, ink: limit },
+                ]))
+                (legend::of_strips(&STATES, &self.states, &self.limits))
+                (self.command_plot(&axis, &told, drive == Drive::Rpm))
+                (sensor(&axis, &self.pressure, "pressure [MPa]", palette::PRESSURE))
+                @if drive != Drive::Rpm {
+                    (sensor(&axis, &self.screw, "screw [rpm]", palette::SCREW))
+                }
+                (sensor(&axis, &self.filled, "filled length [mm]", palette::FILLED))
+                @if let Some(summary) = summary { (times(summary)) }
+            }
+        }
+    }
+
+    fn flow_plot(&self, axis: &XAxis) -> Markup {
+        // A live run knows what a sensor tells, if there is one.
+        let (flow, name) = if self.flow.is_empty() {
+            (&self.sensed_flow, "measured")
+        } else {
+            (&self.flow, "at the nozzle")
+        };
+        let plot = Plot {
+            area: Area::wide(240.0),
+            x: axis,
+            y_title: "flow [mm³/s]",
+            y_range: y_range(&[&self.wanted, flow, &self.foretold], &[0.0]),
+            layers: vec![
+                Layer::Wish(&self.wanted, palette::TARGET),
+                Layer::Curve(flow, palette::FLOW),
+                Layer::Wish(&self.foretold, palette::MODEL),
+            ],
+        };
+        let entries = [
+            (&self.wanted, ("wanted", palette::TARGET, "dash")),
+            (flow, (name, palette::FLOW, "")),
+            (&self.foretold, ("foretold by the model", palette::MODEL, "dash")),
+        ];
+        html! { (legend::legend(&legend::drawn(&entries))) (plot.draw()) }
+    }
+
+    fn command_plot(&self, axis: &XAxis, title: &str, with_screw: bool) -> Markup {
+        let mut layers = vec![
+            Layer::Wish(&self.feedforward, palette::DEMAND),
+            Layer::Stairs(&self.command, palette::SETPOINT),
+        ];
+        let mut shown = vec![&self.command];
+        let mut entries = vec![
+            (&self.command, ("command", palette::SETPOINT, "")),
+            (&self.feedforward, ("known beforehand", palette::DEMAND, "dash")),
+        ];
+        if with_screw {
+            layers.push(Layer::Curve(&self.screw, palette::SCREW));
+            shown.push(&self.screw);
+            entries.push((&self.screw, ("screw", palette::SCREW, "")));
+        }
+        let plot = Plot {
+            area: Area::wide(220.0),
+            x: axis,
+            y_title: title,
+            y_range: y_range(&shown, &[0.0]),
+            layers,
+        };
+        html! { (legend::legend(&legend::drawn(&entries))) (plot.draw()) }
+    }
+}
+
+/// How long what held.
+fn times(summary: &ExtruderSummary) -> Markup {
+    let total: f64 = summary.states_s.values().sum();
+    let row = |what: &str, name: &str, seconds: f64| {
+        html! { tr {
+            td { (what) } td { (names::spoken(name)) }
+            td.number { (format!("{seconds:.1} s")) }
+            td.number { (format!("{:.1} %", 100.0 * seconds / total.max(1e-9))) }
+        } }
+    };
+    html! {
+        table {
+            thead { tr { th { "" } th { "" } th.number { "time" } th.number { "share" } } }
+            tbody {
+                @for (name, seconds) in &summary.states_s { (row("state", name, *seconds)) }
+                @for (name, seconds) in &summary.held_for_s {
+                    (row("held because of", name, *seconds))
+                }
+                @for (name, seconds) in &summary.limited_by_s { (row("limit", name, *seconds)) }
+                @for (name, count) in &summary.fault_reasons { tr {
+                    td { "fault" } td { (names::spoken(name)) }
+                    td.number { (count) " ×" } td {}
+                } }
+            }
+        }
+    }
+}
+
+fn sensor(axis: &XAxis, series: &Series, title: &str, ink: Ink) -> Markup {
+    if series.is_empty() {
+        return html! {};
+    }
+    let plot = Plot {
+        area: Area::wide(200.0),
+        x: axis,
+        y_title: title,
+        y_range: y_range(&[series], &[0.0]),
+        layers: vec![Layer::Curve(series, ink)],
+    };
+    plot.draw()
+}
+
+fn limit(name: &str) -> Option<Ink> {
+    (name != "none").then_some(palette::LIMIT)
+}

@@ -1,0 +1,279 @@
+//! The parts of the page, one below the other.
+
+use base64::Engine as _;
+use maud::{Markup, html};
+
+use super::Report;
+use super::area::{Area, XAxis};
+use super::charts::Twice;
+use super::legend;
+use super::palette;
+use super::palette::Ink;
+use super::plot::{Layer, Plot, y_range};
+use super::series::Series;
+use super::strip::Strip;
+use super::strips;
+use super::strips::Row;
+use super::{advice, histogram};
+use crate::numeric::statistics::as_f64;
+use crate::rows::setup;
+use crate::rows::summary::Summary;
+
+pub use super::legend::legend;
+
+/// The states of the width controller.
+const STATES: [&str; 5] = ["idle", "priming", "tracking", "holding", "fault"];
+
+/// Width, speed, states and limits over time, or over frames.
+pub fn over_time(report: &Report<'_>) -> Markup {
+    let charts = report.charts;
+    let strips = [&charts.refused, &charts.states, &charts.limits].map(strip_extent);
+    let extents = [charts.width.time.extent(), charts.speed.time.extent()];
+    let Some(range) = spanned(extents.into_iter().chain(strips)) else { return html! {} };
+    let timed = charts.timed == Some(true);
+    let axis = if timed { XAxis::time(range) } else { XAxis::frames(range) };
+    html! {
+        section {
+            h2 { @if timed { "Over time" } @else { "Frame by frame" } }
+            (width_plot(report, &axis, |twice| &twice.time))
+            (strips::draw(&axis, &[Row { name: "refused", strip: &charts.refused, ink: refused }]))
+            @if report.summary.control.is_some() {
+                (speed_plot(report, &axis, |twice| &twice.time))
+                (strips::draw(&axis, &[
+                    Row { name: "state", strip: &charts.states, ink: palette::state },
+                    Row { name: "limit", strip: &charts.limits, ink: limit },
+                ]))
+                (legend::of_strips(&STATES, &charts.states, &charts.limits))
+            }
+        }
+    }
+}
+
+/// Width and speed over the path.
+pub fn over_path(report: &Report<'_>) -> Markup {
+    let charts = report.charts;
+    let extents = [charts.width.path.extent(), charts.speed.path.extent()];
+    let Some(range) = spanned(extents.into_iter()) else { return html! {} };
+    let axis = XAxis::path(range);
+    html! {
+        section {
+            h2 { "Along the bead" }
+            p.hint { "Width and speed stand where the bead was laid: below a width is the speed of \
+                the nozzle at that very place, before the camera saw it." }
+            (width_plot(report, &axis, |twice| &twice.path))
+            (speed_plot(report, &axis, |twice| &twice.path))
+        }
+    }
+}
+
+fn width_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) -> Markup {
+    let charts = report.charts;
+    let width = pick(&charts.width);
+    let course = pick(&charts.target);
+    let varies = course.range().is_some_and(|(low, high)| high - low > 1e-6);
+    let target = report.summary.target_width_mm.filter(|_| !varies);
+    let values: Vec<f64> = target.into_iter().collect();
+    let name = target.map(|target| format!("{target} mm")).unwrap_or_default();
+    let mut layers = vec![
+        Layer::Band(pick(&charts.width_low), pick(&charts.width_high), palette::WIDTH),
+        Layer::Curve(width, palette::WIDTH),
+    ];
+    layers.extend(target.map(|target| Layer::Level(target, palette::TARGET, name.as_str())));
+    if varies {
+        layers.push(Layer::Curve(course, palette::TARGET));
+    }
+    let plot = Plot {
+        area: Area::wide(270.0),
+        x: axis,
+        y_title: "width [mm]",
+        y_range: y_range(&[width, if varies { course } else { width }], &values),
+        layers,
+    };
+    let mut entries = Vec::new();
+    if !width.is_empty() {
+        entries.push(("width", palette::WIDTH, ""));
+        entries.push(("± 2 standard deviations", palette::WIDTH, "area"));
+    }
+    if target.is_some() || varies {
+        entries.push(("target", palette::TARGET, if varies { "" } else { "dash" }));
+    }
+    if legend::has_marks(&charts.refused) && !axis.title.starts_with("distance") {
+        entries.push(("refused frames, in the strip", palette::REJECTED, "block"));
+    }
+    html! { (legend(&entries)) (plot.draw()) }
+}
+
+fn speed_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) -> Markup {
+    let charts = report.charts;
+    let (speed, setpoint) = (pick(&charts.speed), pick(&charts.setpoint));
+    let demand = pick(&charts.demand);
+    let bounds = report.limits.map(|limits| [limits.min_speed.get(), limits.max_speed.get()]);
+    let names = bounds.map(|bounds| bounds.map(|bound| format!("{bound} mm/s")));
+    let mut layers = vec![
+        Layer::Wish(demand, palette::DEMAND),
+        Layer::Stairs(setpoint, palette::SETPOINT),
+        Layer::Curve(speed, palette::SPEED),
+    ];
+    if let (Some(bounds), Some(names)) = (bounds, &names) {
+        let levels = bounds.iter().zip(names);
+        layers.extend(levels.map(|(bound, name)| Layer::Level(*bound, palette::LIMIT, name)));
+    }
+    let plot = Plot {
+        area: Area::wide(270.0),
+        x: axis,
+        y_title: "speed [mm/s]",
+        // A demand far beyond the limits would press everything else flat.
+        y_range: y_range(&[speed, setpoint], bounds.as_ref().map_or(&[], |bounds| bounds)),
+        layers,
+    };
+    let mut entries = legend::drawn(&[
+        (speed, ("robot", palette::SPEED, "")),
+        (setpoint, ("setpoint", palette::SETPOINT, "")),
+        (demand, ("demand of the controller", palette::DEMAND, "dash")),
+    ]);
+    if bounds.is_some() {
+        entries.push(("limits of the cell", palette::LIMIT, "dash"));
+    }
+    html! { (legend(&entries)) (plot.draw()) }
+}
+
+/// Which frames were refused, why, and what to do.
+pub fn rejections(report: &Report<'_>) -> Markup {
+    let summary = report.summary;
+    let mut rejected: Vec<_> = summary.rejected.iter().collect();
+    rejected.sort_by(|a, b| b.1.cmp(a.1));
+    html! {
+        @if !rejected.is_empty() {
+            section {
+                h2 { "Refused frames" }
+                div.wide { table {
+                    thead { tr {
+                        th { "status" } th.number { "frames" } th.number { "share" }
+                        th { "what it means" } th { "what to do" }
+                    } }
+                    tbody { @for (status, count) in rejected {
+                        @let (meaning, remedy) = advice::on(status);
+                        tr {
+                            td { code { (status) } }
+                            td.number { (count) }
+                            td.number { (format!("{:.2} %", as_f64(*count) / as_f64(summary.frames.max(1)) * 100.0)) }
+                            td { (meaning) }
+                            td { (remedy) }
+                        }
+                    } }
+                } }
+            }
+        }
+    }
+}
+
+/// Some frames with the edges drawn in.
+pub fn pictures(report: &Report<'_>) -> Markup {
+    html! {
+        @if !report.pictures.is_empty() {
+            section {
+                h2 { "What the camera saw" }
+                (legend(&[
+                    ("left or upper edge", palette::LEFT_EDGE, "dot"),
+                    ("right or lower edge", palette::RIGHT_EDGE, "dot"),
+                    ("gauge", palette::GAUGE, "dash"), ("gauge of a refused frame", palette::REJECTED, "dash"),
+                ]))
+                p.hint { "A click enlarges a picture; a click beside it puts it back." }
+                div.pictures { @for picture in report.pictures { figure tabindex="0" {
+                    img alt=(format!("frame {}", picture.frame)) src=(data_uri(&picture.jpeg));
+                    figcaption { b { "frame " (picture.frame) } " · " (picture.caption) }
+                } } }
+            }
+        }
+    }
+}
+
+fn data_uri(jpeg: &[u8]) -> String {
+    format!("data:image/jpeg;base64,{}", base64::engine::general_purpose::STANDARD.encode(jpeg))
+}
+
+/// How good the pictures are.
+pub fn hints(report: &Report<'_>) -> Markup {
+    let charts = report.charts;
+    let Some(range) = charts.contrast.extent() else { return html! {} };
+    // Widths that were simulated without a picture have no hints.
+    if charts.contrast.range().is_none_or(|(_, most)| most <= 0.0) {
+        return html! {};
+    }
+    let axis = if charts.timed == Some(true) { XAxis::time(range) } else { XAxis::frames(range) };
+    // A steady hint is drawn as steady, not as its last digits.
+    let small = |series: &Series, least_top: f64, y_title: &str| {
+        let (low, high) = y_range(&[series], &[0.0]);
+        Plot {
+            area: Area::half(190.0),
+            x: &axis,
+            y_title,
+            y_range: (low.max(0.0), high.max(least_top)),
+            layers: vec![Layer::Curve(series, palette::WIDTH)],
+        }
+        .draw()
+    };
+    html! {
+        section {
+            h2 { "How good the pictures are" }
+            (improvements(report.summary))
+            p.hint { "Much contrast, little blur and noise and no saturation make a sure width. A \
+                slow drift tells of dust on the lens or of changing light." }
+            div.pair {
+                (small(&charts.contrast, 10.0, "contrast [grey levels of 256]"))
+                (small(&charts.blur, 0.1, "blur of the edges [px]"))
+                (small(&charts.noise, 0.1, "noise of a pixel [grey levels of 256]"))
+                (small(&charts.saturated, 0.1, "saturated pixels in the gauge [%]"))
+                (small(&charts.used, 100.0, "rows that the width comes from [%]"))
+                (small(&charts.sigma, 0.001, "standard deviation of the width [mm]"))
+            }
+        }
+    }
+}
+
+/// What could be better about light and lens.
+fn improvements(summary: &Summary) -> Markup {
+    let bound = setup::row_bound_px(&summary.hints);
+    html! {
+        @if !summary.advice.is_empty() {
+            ul.advice { @for sentence in &summary.advice { li { (sentence) } } }
+        } @else if bound.is_some() {
+            p { "There is nothing to improve about light and lens." }
+        }
+        @if let Some(bound) = bound {
+            p.hint { "In such pictures no method can place an edge in one row with a standard \
+                deviation below " (format!("{bound:.3}")) " px; a hundred rows make that ten times \
+                less." }
+        }
+    }
+}
+
+/// How long a frame takes to become a setpoint.
+pub fn latency(report: &Report<'_>) -> Markup {
+    html! {
+        @if let Some(latencies) = report.latencies.filter(|latencies| latencies.total() > 0) {
+            section {
+                h2 { "From frame to setpoint" }
+                p.hint { "From having the frame to having written the first setpoint that uses it, \
+                    less the wait for the fixed-rate sender's turn." }
+                (histogram::draw(latencies))
+            }
+        }
+    }
+}
+
+fn refused(name: &str) -> Option<Ink> {
+    (name != "ok").then_some(palette::REJECTED)
+}
+
+fn limit(name: &str) -> Option<Ink> {
+    (name != "none").then_some(palette::LIMIT)
+}
+
+fn strip_extent(strip: &Strip) -> Option<(f64, f64)> {
+    Some((strip.spells().first()?.from, strip.spells().last()?.to))
+}
+
+fn spanned(extents: impl Iterator<Item = Option<(f64, f64)>>) -> Option<(f64, f64)> {
+    extents.flatten().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}

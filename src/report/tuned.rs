@@ -1,0 +1,232 @@
+//! What tuning found and proposes: a table, `tune.json` and a page.
+
+mod json;
+mod page;
+mod text;
+
+use crate::cell::Cell;
+use crate::cell::file::RunPart;
+use crate::sim::cell::SimError;
+use crate::tune::candidate::Candidate;
+use crate::tune::noise::Drift;
+use crate::tune::predict::{Prediction, SEEDS, World};
+use crate::tune::propose::{Proposal, propose, worst};
+use crate::tune::stability::{LoopMargins, LoopPlant};
+use crate::tune::{Log, Plant};
+use crate::width_control::limiter::Limits;
+use crate::width_control::pi::PiGains;
+
+/// Standard deviations from which a setting of the cell counts as wrong.
+const WRONG: f64 = 3.0;
+/// Part of the speeds' range that may be left of the robot's answer.
+const UNLIKE: f64 = 0.1;
+/// Part of widths that were refused from which the noise is not to be trusted.
+const MANY_REFUSED: f64 = 0.2;
+
+/// A recording that was looked at, and what follows.
+#[derive(Debug, Clone)]
+pub struct Tuned {
+    /// The recording.
+    pub recording: String,
+    /// The cell that is tuned.
+    pub cell: String,
+    /// What was recorded.
+    pub log: Log,
+    /// What was found.
+    pub plant: Plant,
+    /// What is proposed.
+    pub proposal: Proposal,
+    /// Width that is asked for \[mm\].
+    pub target_mm: f64,
+    /// The cell's limits.
+    pub limits: Limits,
+    /// The cell's distance of the camera and its standard deviation now \[mm\].
+    pub offset_now_mm: (f64, f64),
+    /// The cell's PI gains now, on the error in mm, with their margins at the worst
+    /// speed.
+    pub gains_now: Option<(PiGains, Option<LoopMargins>)>,
+    /// The loop at the speed at which the target is laid.
+    pub usual: LoopPlant,
+    /// What the laws would do: as it is now where it holds a width, the proposed PI,
+    /// the proposed law by distance.
+    pub predictions: Vec<Prediction>,
+    /// The law by distance as proposed, and told wrong.
+    pub misled: Vec<Prediction>,
+    /// Band within which a bead counts as settled \[mm\].
+    pub band_mm: f64,
+    /// Where the flow steps in the simulated beads \[mm\].
+    pub step_at_mm: f64,
+}
+
+impl Tuned {
+    /// Proposes settings for what was found, and lays beads with them. Fails where the
+    /// cell cannot be simulated.
+    pub fn of(
+        recording: String,
+        cell_name: String,
+        log: Log,
+        plant: Plant,
+        cell: &Cell,
+        run: &RunPart,
+    ) -> Result<Self, SimError> {
+        let target_mm = run.control.target.nominal().get();
+        let proposal = propose(&plant, run);
+        let world = World::new(cell, run, &plant);
+        let now = Candidate::now(run);
+        let laws =
+            now.into_iter().chain([Candidate::pi(&proposal), Candidate::distance(&proposal)]);
+        let predictions = laws.map(|who| world.predict(&who)).collect::<Result<_, _>>()?;
+        let misled = Candidate::misled(&proposal);
+        let misled = misled.iter().map(|who| world.predict(who)).collect::<Result<_, _>>()?;
+        let at = worst(&plant, target_mm, &run.limits);
+        Ok(Self {
+            recording,
+            cell: cell_name,
+            log,
+            proposal,
+            target_mm,
+            limits: run.limits,
+            offset_now_mm: (run.camera.offset.get(), run.camera.offset_sigma.get()),
+            usual: LoopPlant::at(&plant, target_mm, speed_within(&plant, target_mm, &run.limits)),
+            gains_now: run.control.gains.map(|gains| (gains, at.margins(gains))),
+            predictions,
+            misled,
+            band_mm: world.band_mm,
+            step_at_mm: world.step_at_mm,
+            plant,
+        })
+    }
+
+    /// What somebody should know before anything of this is used.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        warnings.extend(self.log.cut_short().map(|why| format!("{why}; fewer pieces tell less")));
+        warnings.extend(self.gains_warning());
+        warnings.extend(self.offset_warning());
+        if let Err(error) = &self.plant.robot {
+            warnings.push(format!("{error}; a robot of 10 Hz without dead time is taken instead"));
+        }
+        warnings.extend(self.robot_warning());
+        for one in self.predictions.iter().filter(|one| one.stopped > 0) {
+            warnings.push(format!(
+                "{}: the controller gave up {} of {SEEDS} foretold beads",
+                one.name, one.stopped
+            ));
+        }
+        if let [.., pi, distance] = self.predictions.as_slice()
+            && distance.steady_rms_mm > pi.steady_rms_mm
+        {
+            warnings.push(
+                "the law by distance is foretold to be no steadier than the PI law on this cell; \
+                 it needs a robot that follows within a part of the way to the camera (--law pi \
+                 writes the PI law)"
+                    .to_owned(),
+            );
+        }
+        let speed = self.plant.speed_for(self.target_mm);
+        let (min, max) = (self.limits.min_speed.get(), self.limits.max_speed.get());
+        if !(min..=max).contains(&speed) {
+            warnings.push(format!(
+                "the target of {} mm would take {speed:.1} mm/s, and [limits] are {min} to {max} \
+                 mm/s",
+                self.target_mm
+            ));
+        }
+        let all = self.log.refused + self.log.widths.len() as u64;
+        #[expect(clippy::cast_precision_loss, reason = "counts of frames")]
+        let share = self.log.refused as f64 / all.max(1) as f64;
+        if share > MANY_REFUSED {
+            warnings.push(format!(
+                "{:.0} % of the frames gave no width; see why with truebead process",
+                100.0 * share
+            ));
+        }
+        warnings
+    }
+
+    fn gains_warning(&self) -> Option<String> {
+        let (_, margins) = self.gains_now.as_ref()?;
+        let margins = (*margins)?;
+        if margins.are_enough() {
+            return None;
+        }
+        let at = self.proposal.pi.at.speed_mm_per_s;
+        Some(if margins.is_stable {
+            format!(
+                "the cell's PI gains leave a gain margin of {:.2} and {:.0}° of phase at {at} mm/s; \
+                 2 and 45° are what a loop is to have",
+                margins.gain, margins.phase_deg
+            )
+        } else {
+            format!("the cell's PI gains are unstable at {at} mm/s: the width would swing up")
+        })
+    }
+
+    fn robot_warning(&self) -> Option<String> {
+        let robot = self.plant.robot.ok()?;
+        let (from, to) = self.plant.study.found.speeds;
+        (robot.left_mm_per_s > UNLIKE * (to - from).get()).then(|| {
+            format!(
+                "the robot answers otherwise than by a dead time, a lag and a largest slope: {:.1} \
+                 mm/s RMS are left of its reported speed; what is foretold is not to be trusted",
+                robot.left_mm_per_s
+            )
+        })
+    }
+
+    fn offset_warning(&self) -> Option<String> {
+        let (now, sigma) = self.offset_now_mm;
+        let found = self.plant.offset_mm;
+        let off = (now - found.value).abs();
+        (off > WRONG * found.sigma.hypot(sigma))
+            .then(|| format!("the cell has offset_mm = {now}, {off:.1} mm from what was found"))
+    }
+
+    /// Lines of a cell file that were found: table, key and value. `unit_mm` is the
+    /// cell's `error_unit_mm`.
+    pub fn settings(
+        &self,
+        by_distance: bool,
+        unit_mm: f64,
+    ) -> Vec<(&'static str, &'static str, f64)> {
+        let (distance, gains) = (self.proposal.distance, self.proposal.pi.gains);
+        let mut settings = Vec::new();
+        if by_distance {
+            settings.push(("control", "exponent", rounded(distance.exponent, 4)));
+            settings.push(("control", "drift_per_root_m", rounded(distance.drift_per_root_m, 3)));
+        }
+        settings.extend([
+            ("control", "kp_per_s", rounded(gains.kp_per_s * unit_mm, 4)),
+            ("control", "ki_per_s2", rounded(gains.ki_per_s2 * unit_mm, 4)),
+            ("camera", "offset_mm", rounded(distance.offset_mm, 4)),
+            ("camera", "offset_sigma_mm", rounded(distance.offset_sigma_mm, 2)),
+        ]);
+        settings
+    }
+
+    /// The drift in words.
+    fn drift_words(&self) -> String {
+        match self.plant.scatter.drift {
+            Drift::Found { per_root_m, low, high } => format!(
+                "{:.2} % along a metre ({:.2} to {:.2} %)",
+                100.0 * per_root_m,
+                100.0 * low,
+                100.0 * high
+            ),
+            Drift::AtMost(most) => {
+                format!("none seen; at most {:.2} % along a metre (95 %)", 100.0 * most)
+            }
+        }
+    }
+}
+
+/// Speed at which the target is laid, within limits \[mm/s\].
+fn speed_within(plant: &Plant, target_mm: f64, limits: &Limits) -> f64 {
+    let (min, max) = (limits.min_speed.get().max(1.0), limits.max_speed.get());
+    plant.speed_for(target_mm).max(min).min(max)
+}
+
+/// To so many digits that count.
+fn rounded(value: f64, digits: usize) -> f64 {
+    format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
+}

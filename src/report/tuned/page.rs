@@ -1,0 +1,246 @@
+//! `report.html` of a tuned cell.
+
+use maud::{Markup, html};
+
+use super::Tuned;
+use super::text::margin_words;
+use crate::identify::camera_offset::Seen;
+use crate::report::run::area::{Area, XAxis};
+use crate::report::run::legend::legend;
+use crate::report::run::palette::{CONTENDERS, Ink, LIMIT, MODEL, SETPOINT, SPEED, TARGET, WIDTH};
+use crate::report::run::plot::{Layer, Plot, y_range};
+use crate::report::run::series::Series;
+use crate::report::run::whole_page;
+use crate::studies::reproduce::series;
+use crate::tune::predict::{FLOW_STEP, Prediction, SEEDS};
+
+/// Time of the robot's answer that is shown about its steps \[s\].
+const SHOWN_S: f64 = 30.0;
+
+impl Tuned {
+    /// The page.
+    pub fn page(&self) -> String {
+        let title = "Tuning a cell";
+        let body = html! {
+            h1 { (title) }
+            div.about {
+                span { "cell " b { (self.cell) } }
+                span { "recording " b { (self.recording) } }
+                span { "target " b { (self.target_mm) " mm" } }
+            }
+            (self.verdict())
+            (self.numbers())
+            (self.bead())
+            (self.robot())
+            (self.margins())
+            (self.foretold())
+            section {
+                h2 { "The lines" }
+                p.hint { "Nothing is applied. Copy these into the cell, or let " code { "--write" }
+                    " make a copy of it." }
+                pre { (self.lines()) }
+            }
+            footer { "Written by truebead " (env!("CARGO_PKG_VERSION"))
+                ". The numbers are in tune.json." }
+        };
+        whole_page(title, &body).into_string()
+    }
+
+    fn verdict(&self) -> Markup {
+        let warnings = self.warnings();
+        let (class, word) =
+            if warnings.is_empty() { ("good", "Good.") } else { ("caution", "Look closer.") };
+        let best = self.predictions.last();
+        html! {
+            div class={ "verdict " (class) } {
+                b { (word) }
+                @if let Some(best) = best {
+                    (format!(
+                        " By distance the bead is foretold to be {:.2} mm RMS off its target once \
+                         steady.",
+                        best.steady_rms_mm
+                    ))
+                }
+                @if !warnings.is_empty() {
+                    ul { @for warning in &warnings { li { (warning) } } }
+                }
+            }
+        }
+    }
+
+    fn numbers(&self) -> Markup {
+        html! {
+            section {
+                h2 { "What was found" }
+                p.hint { "± is one standard deviation." }
+                div.wide { table { tbody { @for (name, words) in self.found() {
+                    tr { td { (name) } td { (words) } }
+                } } } }
+            }
+        }
+    }
+
+    fn bead(&self) -> Markup {
+        let study = &self.plant.study;
+        let seen = |of: &dyn Fn(&Seen) -> f64| {
+            let offset = self.plant.offset_mm.value;
+            let points: Vec<_> =
+                study.seen.iter().map(|seen| (seen.path_mm - offset, of(seen))).collect();
+            series(&points)
+        };
+        let widths = seen(&|seen| seen.ln_width.exp());
+        let model = seen(&|seen| (seen.ln_width - study.left(seen)).exp());
+        let left = seen(&|seen| 100.0 * study.left(seen));
+        let speeds = seen(&|seen| seen.ln_speed.exp());
+        let Some(range) = widths.extent() else { return html! {} };
+        let axis = XAxis::path(range);
+        html! {
+            section {
+                h2 { "The bead" }
+                p.hint { "Widths where they had been laid, with the model that was fitted; the \
+                    robot's speed there; and what is left of the widths." }
+                (legend(&[("measured width", WIDTH, ""), ("model", MODEL, "")]))
+                (plot(&axis, "width [mm]", 240.0, &[], vec![
+                    Layer::Data(&widths, WIDTH), Layer::Curve(&model, MODEL),
+                ], &[&widths, &model]))
+                (plot(&axis, "robot's speed [mm/s]", 150.0, &[], vec![
+                    Layer::Curve(&speeds, SPEED),
+                ], &[&speeds]))
+                (plot(&axis, "left [% of the width]", 150.0, &[0.0], vec![
+                    Layer::Curve(&left, WIDTH), Layer::Level(0.0, TARGET, ""),
+                ], &[&left]))
+            }
+        }
+    }
+
+    fn robot(&self) -> Markup {
+        let Some((begin, _)) = self.log.setpoints.first() else { return html! {} };
+        let from = begin.secs();
+        let within = |at: f64| (from..from + SHOWN_S).contains(&at);
+        let told = self.log.setpoints.iter().map(|(at, speed)| (at.secs(), speed.get()));
+        let told: Vec<_> = told.filter(|(at, _)| within(*at)).collect();
+        let reported = self.log.states.iter();
+        let reported = reported.map(|(at, state)| (at.secs(), state.speed_mm_per_s.get()));
+        let reported: Vec<_> = reported.filter(|(at, _)| within(*at)).collect();
+        let (told, reported) = (series(&told), series(&reported));
+        let Some(range) = told.extent() else { return html! {} };
+        let axis = XAxis::time(range);
+        html! {
+            section {
+                h2 { "The robot" }
+                (legend(&[("setpoint", SETPOINT, ""), ("reported speed", SPEED, "")]))
+                (plot(&axis, "speed [mm/s]", 220.0, &[], vec![
+                    Layer::Stairs(&told, SETPOINT), Layer::Curve(&reported, SPEED),
+                ], &[&told]))
+            }
+        }
+    }
+
+    fn margins(&self) -> Markup {
+        let at = self.proposal.pi.at;
+        html! {
+            section {
+                h2 { "Margins of the PI law" }
+                p.hint { (format!(
+                    "At {} mm/s, the slowest of [limits], where a loop around this bead is nearest \
+                     to the edge: {:.3} mm for each mm/s, behind {:.3} s of dead time. The proposed \
+                     gains are those of the rule AMIGO (Åström and Hägglund 2006). A loop is to \
+                     have a gain margin of 2 and a phase margin of 45°.",
+                    at.speed_mm_per_s, at.gain_s, at.dead_s
+                )) }
+                div.wide { table {
+                    thead { tr {
+                        th { "gains" } th.number { "kp_per_s" } th.number { "ki_per_s2" }
+                        th.number { "gain margin" } th.number { "phase margin" }
+                        th.number { "delay margin" } th.number { "Ms" }
+                    } }
+                    tbody { @for (name, gains, margins) in self.loops() { tr {
+                        td { (name) }
+                        td.number { (format!("{:.3}", gains.kp_per_s)) }
+                        td.number { (format!("{:.3}", gains.ki_per_s2)) }
+                        @for word in margin_words(margins) { td.number { (word) } }
+                    } } }
+                } }
+            }
+        }
+    }
+
+    fn foretold(&self) -> Markup {
+        let beads: Vec<Series> = self.predictions.iter().map(|one| series(&one.bead)).collect();
+        let speeds: Vec<Series> = self.predictions.iter().map(|one| series(&one.speed)).collect();
+        let Some(range) = beads.iter().find_map(Series::extent) else { return html! {} };
+        let axis = XAxis::path(range);
+        let names: Vec<_> = self
+            .predictions
+            .iter()
+            .zip(CONTENDERS)
+            .map(|(one, ink)| (one.name.as_str(), ink, ""))
+            .collect();
+        let target = format!("{} mm", self.target_mm);
+        let level = [Layer::Level(self.target_mm, TARGET, &target)];
+        let bounds = [self.limits.min_speed.get(), self.limits.max_speed.get()];
+        let limits = bounds.map(|bound| Layer::Level(bound, LIMIT, ""));
+        html! {
+            section {
+                h2 { "What is foretold" }
+                p.hint { (format!(
+                    "Beads of the cell as it was found, {SEEDS} with each law; the first of them is \
+                     drawn, in means over the gauge. At {:.0} mm the flow rises by {:.0} %. The table tells the way from \
+                     the start of control, and from the flow's step, until the bead is within \
+                     {:.2} mm of its target for good, and the RMS error once it is steady and of \
+                     all.",
+                    self.step_at_mm, 100.0 * FLOW_STEP, self.band_mm
+                )) }
+                (legend(&names))
+                (plot(&axis, "width of the bead [mm]", 260.0, &[self.target_mm],
+                    curves(&beads, CONTENDERS).chain(level).collect(),
+                    &beads.iter().collect::<Vec<_>>()))
+                (plot(&axis, "robot's speed [mm/s]", 200.0, &bounds,
+                    curves(&speeds, CONTENDERS).chain(limits).collect(), &[]))
+                (table("law", &self.predictions))
+                p.hint { "The law by distance has no gains that could swing. What stands for a \
+                    margin is how far what it is told may be wrong:" }
+                (table("the law by distance", &self.misled))
+            }
+        }
+    }
+}
+
+fn curves(of: &[Series], inks: [Ink; 6]) -> impl Iterator<Item = Layer<'_>> {
+    of.iter().zip(inks).map(|(one, ink)| Layer::Curve(one, ink))
+}
+
+fn plot(
+    axis: &XAxis,
+    title: &str,
+    height: f64,
+    shown: &[f64],
+    layers: Vec<Layer<'_>>,
+    ranged: &[&Series],
+) -> Markup {
+    let y_range = y_range(ranged, shown);
+    Plot { area: Area::wide(height), x: axis, y_title: title, y_range, layers }.draw()
+}
+
+fn table(head: &str, of: &[Prediction]) -> Markup {
+    let way = |way: Option<f64>| way.map_or("not".to_owned(), |mm| format!("{mm:.0}"));
+    html! {
+        div.wide { table {
+            thead { tr {
+                th { (head) } th.number { "start [mm]" } th.number { "flow's step [mm]" }
+                th.number { "steady RMS [mm]" } th.number { "whole RMS [mm]" }
+                th.number { "speeds [mm/s]" }
+            } }
+            tbody { @for one in of { tr {
+                td { (one.name) }
+                td.number { (way(one.start_settles_mm)) }
+                td.number { (way(one.step_settles_mm)) }
+                td.number { (format!("{:.3}", one.steady_rms_mm)) }
+                td.number { (format!("{:.3}", one.whole_rms_mm)) }
+                td.number { (format!(
+                    "{:.0} to {:.0}", one.speeds_mm_per_s.1, one.speeds_mm_per_s.0
+                )) }
+            } } }
+        } }
+    }
+}

@@ -1,0 +1,10 @@
+//! What a run leaves as data: `widths.csv`, `edges.csv`, `summary.json`.
+
+pub mod edges;
+pub mod frame_row;
+pub mod log;
+pub mod names;
+pub mod output;
+pub mod setup;
+pub mod summary;
+pub mod widths;

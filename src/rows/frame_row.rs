@@ -1,0 +1,105 @@
+//! What is known of one frame once it has been looked at.
+
+use crate::core::units::{Mm, MmPerS};
+use crate::vision::{Roughness, WidthMeasurement};
+use crate::width_control::{Limit, Step};
+
+/// One row of `widths.csv`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameRow {
+    /// Number of the frame, from 0.
+    pub frame: u64,
+    /// Time of the frame \[s\]; none where nothing tells it. In a run it is the
+    /// capture stamp, so that it shares its start with the steps.
+    pub time_s: Option<f64>,
+    /// The width, or the status of a frame that was refused.
+    pub outcome: Result<WidthMeasurement, &'static str>,
+    /// Roughness of the bead from all frames up to this one; none while it is not
+    /// determined.
+    pub roughness: Option<Roughness>,
+    /// What the controller knew at that frame; none where there is no
+    /// controller.
+    pub control: Option<ControlColumns>,
+}
+
+/// Columns that only a run with a controller has.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ControlColumns {
+    /// Where along the path the bead in the gauge had been laid.
+    pub bead_path: Option<Mm>,
+    /// Whether bead of this run was under the camera; a frame without it is no
+    /// loss when it is refused.
+    pub bead_expected: bool,
+    /// Distance of the nozzle along the path when the frame was captured.
+    pub nozzle_path: Option<Mm>,
+    /// Speed that the robot reported.
+    pub speed: Option<MmPerS>,
+    /// Last setpoint that was sent.
+    pub setpoint: Option<MmPerS>,
+    /// Name of the controller's state.
+    pub state: &'static str,
+    /// The limit that acted on the last setpoint.
+    pub limit: Limit,
+    /// Width that was asked for where that bead was laid.
+    pub target: Option<Mm>,
+}
+
+impl ControlColumns {
+    /// From the answer to a frame, with the width that it showed, the speed
+    /// that the robot last reported and the last setpoint.
+    pub fn of(
+        step: &Step,
+        width: Option<Mm>,
+        speed: Option<MmPerS>,
+        setpoint: Option<MmPerS>,
+    ) -> Self {
+        let trace = &step.trace;
+        Self {
+            bead_path: trace.bead_path_mm,
+            bead_expected: trace.bead_expected,
+            nozzle_path: trace.nozzle_path_mm,
+            speed,
+            setpoint,
+            state: step.state.name(),
+            limit: trace.limit,
+            target: width.zip(trace.error_mm).map(|(width, error)| width - error),
+        }
+    }
+}
+
+/// Measurements for the tests of this folder.
+#[cfg(test)]
+pub mod sample {
+    use crate::core::geometry::ImagePoint;
+    use crate::core::units::Mm;
+    use crate::vision::{Hints, Roughness, WidthMeasurement};
+
+    /// A roughness that is determined.
+    pub fn roughness() -> Roughness {
+        Roughness {
+            roughness: Mm::constant(0.1),
+            roughness_sigma: Mm::constant(0.01),
+            length: Mm::constant(5.0),
+            length_sigma: Mm::constant(1.0),
+        }
+    }
+
+    /// A measurement of this width and standard deviation \[mm\].
+    pub fn measured(width_mm: f64, sigma_mm: f64) -> WidthMeasurement {
+        WidthMeasurement {
+            width: Mm::constant(width_mm),
+            sigma: Mm::constant(sigma_mm),
+            left: ImagePoint::new(100.25, 269.5),
+            right: ImagePoint::new(431.75, 269.5),
+            slant_rad: 0.0,
+            hints: Hints {
+                contrast_grey: 120.0,
+                blur_px: 1.5,
+                noise_grey: 2.0,
+                saturated_share: 0.01,
+                used_share: 0.98,
+                skew: None,
+            },
+        }
+    }
+}

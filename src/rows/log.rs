@@ -1,0 +1,240 @@
+//! Takes down a run, one fact at a time, and leaves `widths.csv`,
+//! `summary.json` and `report.html`.
+
+use std::path::PathBuf;
+
+use super::frame_row::FrameRow;
+use super::output::{LogError, make_folder, write_whole};
+use super::summary::{Note, Summary, SummaryBuilder};
+use super::widths::WidthsWriter;
+use crate::cell::file::RunPart;
+use crate::core::frame::Frame;
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm, Mm3PerS};
+use crate::extruder::{Drive, Law};
+use crate::report::picker::FramePicker;
+use crate::report::run::Report;
+use crate::report::run::charts::Charts;
+use crate::vision::{Edges, Gauge};
+use crate::width_control::limiter::Limits;
+use crate::width_control::{Event, Step};
+
+/// Most remarks that a report lists.
+const MAX_REMARKS: usize = 40;
+
+/// What is known before the first frame.
+#[derive(Debug, Clone)]
+pub struct LogOptions {
+    /// The output folder; made if it is not there.
+    pub folder: PathBuf,
+    /// Title of the report.
+    pub title: String,
+    /// Names and values under the title: input, cell, calibration and so on.
+    pub about: Vec<(String, String)>,
+    /// Where the bead is measured.
+    pub gauge: Gauge,
+    /// Width that is asked for, if known.
+    pub target: Option<Mm>,
+    /// Share of refused frames that the cell bears.
+    pub max_rejected_share: f64,
+    /// What only a run with a controller has.
+    pub control: Option<ControlFacts>,
+}
+
+/// What is known of the controller before the first step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ControlFacts {
+    /// What setpoints may be.
+    pub limits: Limits,
+    /// What the extruder is told, where it is commanded.
+    pub extruder: Option<Drive>,
+    /// How long the profile is that it plays, where it plays one.
+    pub profile: Option<Span>,
+}
+
+impl ControlFacts {
+    /// Of a cell's run, with the law of its extruder.
+    pub fn of(run: &RunPart, law: Option<&Law>) -> Self {
+        let extruder = run.extruder.as_ref().map(|part| part.extruder.drive);
+        let profile = law.and_then(|law| match law {
+            Law::Profile(played) => Some(played.lasts()),
+            _ => None,
+        });
+        Self { limits: run.limits, extruder, profile }
+    }
+}
+
+/// The log of a run. Memory does not grow with its length.
+#[derive(Debug)]
+pub struct RunLog {
+    options: LogOptions,
+    widths: WidthsWriter,
+    summary: SummaryBuilder,
+    charts: Charts,
+    pictures: FramePicker,
+    remarks: Vec<String>,
+    /// Reasons for which the extruder refused lines.
+    refused: Vec<String>,
+}
+
+impl RunLog {
+    /// Makes the folder and begins `widths.csv`.
+    pub fn create(options: LogOptions) -> Result<Self, LogError> {
+        make_folder(&options.folder)?;
+        let with_control = options.control.is_some();
+        Ok(Self {
+            widths: WidthsWriter::create(&options.folder, with_control)?,
+            summary: SummaryBuilder::new(options.target, with_control)
+                .with_profile(options.control.and_then(|control| control.profile)),
+            charts: Charts::default(),
+            pictures: FramePicker::new(options.gauge),
+            remarks: Vec::new(),
+            refused: Vec::new(),
+            options,
+        })
+    }
+
+    /// A frame that was looked at. The picture and the edges are for the
+    /// report and may be left out.
+    pub fn frame(
+        &mut self,
+        row: &FrameRow,
+        picture: Option<&Frame>,
+        edges: Option<Edges<'_>>,
+    ) -> Result<(), LogError> {
+        self.widths.write(row)?;
+        self.summary.frame(row);
+        self.charts.frame(row);
+        if let Some(frame) = picture {
+            self.pictures.offer(row, frame, edges);
+        }
+        Ok(())
+    }
+
+    /// An event and the step that answered it. `now` has the same start as the
+    /// rows' `time_s`.
+    pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
+        self.summary.step(now, event, step);
+        self.charts.step(now, event, step);
+        match event {
+            Event::LinkDown { reason } => {
+                self.remark(now, "the link to the robot was lost", reason);
+            }
+            Event::CameraLost { reason } => {
+                self.remark(now, "the camera gives no more frames", reason);
+            }
+            Event::Refused { seq, code } => {
+                self.remark(now, "the robot refused a line", &format!("number {seq}, {code}"));
+            }
+            Event::ExtruderDown { reason } => {
+                self.remark(now, "the link to the extruder was lost", reason);
+            }
+            // They come at the rate of the commands; the recording has them all.
+            Event::ExtruderRefused { seq, code } if !self.refused.contains(code) => {
+                self.refused.push(code.clone());
+                let why = format!("number {seq}, {code}");
+                self.remark(now, "the extruder refused a line, the first of its kind", &why);
+            }
+            _ => {}
+        }
+    }
+
+    /// The true flow through the nozzle, where a simulation knows it.
+    pub fn flow(&mut self, now: Stamp, wanted: Option<Mm3PerS>, flow: Mm3PerS) {
+        self.charts.extruder.flow(now, flow);
+        self.summary.flow(wanted, flow);
+    }
+
+    /// The latency of a setpoint and what its sender waited by its own
+    /// schedule \[ms\].
+    pub fn latency(&mut self, latency_ms: f64, send_wait_ms: f64) {
+        self.summary.latency(latency_ms, send_wait_ms);
+    }
+
+    /// Another fact.
+    pub fn note(&mut self, note: &Note) {
+        self.summary.note(note);
+        if let Note::Remark(text) = note {
+            self.add_remark(text.clone());
+        }
+    }
+
+    /// Gives every file its final name. `widths.csv` comes first, so that a
+    /// failure of the others does not cost the rows.
+    pub fn finish(self) -> Result<Summary, LogError> {
+        self.widths.finish()?;
+        let summary = self.summary.finish();
+        summary.write(&self.options.folder)?;
+        let report = Report {
+            title: &self.options.title,
+            about: &self.options.about,
+            max_rejected_share: self.options.max_rejected_share,
+            summary: &summary,
+            charts: &self.charts,
+            limits: self.options.control.map(|control| control.limits),
+            extruder: self.options.control.and_then(|control| control.extruder),
+            latencies: self.summary.latencies(),
+            pictures: &self.pictures.finish(),
+            remarks: &self.remarks,
+        };
+        write_whole(&self.options.folder, "report.html", report.page().as_bytes())?;
+        Ok(summary)
+    }
+
+    fn remark(&mut self, now: Stamp, what: &str, why: &str) {
+        self.add_remark(format!("At {:.2} s {what}: {why}.", now.secs()));
+    }
+
+    fn add_remark(&mut self, text: String) {
+        match self.remarks.len() {
+            more if more > MAX_REMARKS => {}
+            MAX_REMARKS => self.remarks.push("Further remarks are left out.".to_string()),
+            _ => self.remarks.push(text),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::report::synthetic;
+    use crate::rows::log::*;
+
+    #[test]
+    fn a_folder_that_cannot_be_one_is_refused_before_the_first_frame() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("out");
+        std::fs::write(&file, "").unwrap();
+        let error = RunLog::create(synthetic::options(&file, "t", false)).unwrap_err();
+        assert!(matches!(error, LogError::NotAFolder { .. }), "{error}");
+    }
+
+    #[test]
+    fn a_log_that_is_let_go_leaves_no_final_name() {
+        let folder = tempfile::tempdir().unwrap();
+        drop(RunLog::create(synthetic::options(folder.path(), "t", true)).unwrap());
+        let names: Vec<_> =
+            std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().file_name()).collect();
+        assert_eq!(names, ["widths.csv.partial"]);
+    }
+
+    #[test]
+    fn a_report_that_cannot_be_written_costs_no_rows() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("report.html")).unwrap();
+        let log = RunLog::create(synthetic::options(folder.path(), "t", true)).unwrap();
+        let error = log.finish().unwrap_err();
+        assert!(error.to_string().contains("report.html"), "{error}");
+        assert!(folder.path().join("widths.csv").is_file());
+        assert!(folder.path().join("summary.json").is_file());
+    }
+
+    #[test]
+    fn remarks_are_bounded() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut log = RunLog::create(synthetic::options(folder.path(), "t", true)).unwrap();
+        for index in 0..1000 {
+            log.note(&Note::Remark(format!("remark {index}")));
+        }
+        assert_eq!(log.remarks.len(), MAX_REMARKS + 1);
+    }
+}

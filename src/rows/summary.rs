@@ -1,0 +1,333 @@
+//! `summary.json`: what a run came to, in numbers.
+
+mod control;
+mod distance;
+mod extruder;
+mod follow;
+mod profile;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+pub use control::ControlSummary;
+use control::ControlTally;
+pub use distance::DistanceSummary;
+use distance::DistanceTally;
+pub use extruder::ExtruderSummary;
+use extruder::ExtruderTally;
+pub use follow::Follower;
+pub use profile::ProfileSummary;
+
+use super::frame_row::FrameRow;
+use super::output::{LogError, write_whole};
+use super::setup;
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm, Mm3PerS};
+use crate::numeric::statistics::{Distribution, Moments, WeightedMean, as_f64};
+use crate::vision::Roughness;
+use crate::width_control::{Event, Step};
+
+/// What a run came to. What is not known is null.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Frames that there were.
+    pub frames: u64,
+    /// Frames whose width was measured.
+    pub measured: u64,
+    /// The others: status in `widths.csv` and how many.
+    pub rejected: BTreeMap<&'static str, u64>,
+    /// Refused frames of a run in which no bead of it was under the camera yet,
+    /// or any more; they are no loss.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rejected_without_bead: Option<u64>,
+    /// Mean of the measured widths.
+    pub width_mean_mm: Option<f64>,
+    /// Their sample standard deviation.
+    pub width_std_mm: Option<f64>,
+    /// Mean of the standard deviations that the measurements claim.
+    pub sigma_mean_mm: Option<f64>,
+    /// Roughness of the bead from all frames, where they determine it; its keys stand
+    /// beside the others.
+    #[serde(flatten)]
+    pub roughness: RoughnessSummary,
+    /// How good the pictures were.
+    pub hints: HintSummary,
+    /// What could be better about light and lens, in words.
+    pub advice: Vec<String>,
+    /// From the first moment that is known to the last.
+    pub duration_s: Option<f64>,
+    /// Width that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_width_mm: Option<f64>,
+    /// What only a run with a controller has; its keys stand beside the others.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub control: Option<ControlSummary>,
+    /// What only a run has whose width is held by distance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distance: Option<DistanceSummary>,
+    /// What only a run has whose extruder is commanded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub extruder: Option<ExtruderSummary>,
+}
+
+/// Medians over the measured frames, within 0.14 %, for whoever sets up light
+/// and lens.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct HintSummary {
+    /// Step from ground to bead \[grey levels of 256\].
+    pub contrast_median_grey: Option<f64>,
+    /// Blur of the edges \[px\].
+    pub blur_median_px: Option<f64>,
+    /// Noise of a pixel \[grey levels of 256\].
+    pub noise_median_grey: Option<f64>,
+    /// Mean share of saturated pixels.
+    pub saturated_share_mean: Option<f64>,
+    /// Mean share of caliper lines in use.
+    pub used_share_mean: Option<f64>,
+    /// How far the skew of the edges' flanks moves widths: measured less true width in the
+    /// picture, the mean weighed by what each frame tells \[px\].
+    pub skew_offset_px: Option<f64>,
+    /// Its standard deviation \[px\].
+    pub skew_offset_sigma_px: Option<f64>,
+}
+
+/// Roughness of the bead, which no standard deviation of a width contains.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct RoughnessSummary {
+    /// Standard deviation of the local width along the bead.
+    pub roughness_mm: Option<f64>,
+    /// Its own standard deviation.
+    pub roughness_sigma_mm: Option<f64>,
+    /// Correlation length: that of exp(−|d|/length).
+    pub roughness_length_mm: Option<f64>,
+    /// Its own standard deviation.
+    pub roughness_length_sigma_mm: Option<f64>,
+}
+
+impl RoughnessSummary {
+    fn of(found: Roughness) -> Self {
+        Self {
+            roughness_mm: Some(found.roughness.get()),
+            roughness_sigma_mm: Some(found.roughness_sigma.get()),
+            roughness_length_mm: Some(found.length.get()),
+            roughness_length_sigma_mm: Some(found.length_sigma.get()),
+        }
+    }
+
+    /// In words; none where it is not determined.
+    pub fn words(&self) -> Option<String> {
+        Some(format!(
+            "roughness {:.3} ± {:.3} mm, correlation length {:.3} ± {:.3} mm",
+            self.roughness_mm?,
+            self.roughness_sigma_mm?,
+            self.roughness_length_mm?,
+            self.roughness_length_sigma_mm?
+        ))
+    }
+}
+
+impl Summary {
+    /// Share of the frames that were refused or unreadable, of those that could
+    /// show bead; 0 of none.
+    pub fn rejected_share(&self) -> f64 {
+        let frames = self.frames_with_bead();
+        if frames == 0 { 0.0 } else { as_f64(frames - self.measured.min(frames)) / as_f64(frames) }
+    }
+
+    /// Frames less those that were refused where no bead of the run could be.
+    pub fn frames_with_bead(&self) -> u64 {
+        self.frames.saturating_sub(self.rejected_without_bead.unwrap_or(0))
+    }
+
+    /// Writes `summary.json` into a folder.
+    pub fn write(&self, folder: &Path) -> Result<PathBuf, LogError> {
+        let text = serde_json::to_vec_pretty(self).map_err(|error| LogError::Write {
+            path: folder.join("summary.json"),
+            source: error.into(),
+        })?;
+        write_whole(folder, "summary.json", &[text.as_slice(), b"\n"].concat())
+    }
+}
+
+/// A fact that neither a frame nor a step tells.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Note {
+    /// A setpoint was written to the robot.
+    SetpointSent,
+    /// Frames that were never looked at, because a newer one was there.
+    FramesSuperseded(u64),
+    /// Frames that the recorder could not keep up with.
+    FramesDroppedByRecorder(u64),
+    /// Events or steps that could not be recorded.
+    RecordsLost(u64),
+    /// Something that the reader of the report should know, in words.
+    Remark(String),
+}
+
+/// Takes facts one at a time, in constant memory, and adds them up.
+#[derive(Debug)]
+pub struct SummaryBuilder {
+    target: Option<Mm>,
+    frames: u64,
+    rejected: BTreeMap<&'static str, u64>,
+    rejected_without_bead: u64,
+    width: Moments,
+    sigma: Moments,
+    roughness: Option<Roughness>,
+    saturated: Moments,
+    used: Moments,
+    contrast: Distribution,
+    blur: Distribution,
+    noise: Distribution,
+    skew: WeightedMean,
+    first_s: Option<f64>,
+    last_s: Option<f64>,
+    control: Option<ControlTally>,
+    distance: DistanceTally,
+    extruder: ExtruderTally,
+}
+
+impl SummaryBuilder {
+    /// `with_control` for runs with a controller.
+    pub fn new(target: Option<Mm>, with_control: bool) -> Self {
+        Self {
+            target,
+            frames: 0,
+            rejected: BTreeMap::new(),
+            rejected_without_bead: 0,
+            width: Moments::default(),
+            sigma: Moments::default(),
+            roughness: None,
+            saturated: Moments::default(),
+            used: Moments::default(),
+            contrast: Distribution::default(),
+            blur: Distribution::default(),
+            noise: Distribution::default(),
+            skew: WeightedMean::default(),
+            first_s: None,
+            last_s: None,
+            control: with_control.then(ControlTally::default),
+            distance: DistanceTally::default(),
+            extruder: ExtruderTally::default(),
+        }
+    }
+
+    /// The same for a run whose extruder plays a profile of this length.
+    #[must_use]
+    pub fn with_profile(mut self, lasts: Option<Span>) -> Self {
+        self.extruder.plays(lasts);
+        self
+    }
+
+    /// A frame that was looked at.
+    pub fn frame(&mut self, row: &FrameRow) {
+        self.frames += 1;
+        self.moment(row.time_s);
+        match &row.outcome {
+            Err(status) => {
+                *self.rejected.entry(status).or_default() += 1;
+                if row.control.is_some_and(|control| !control.bead_expected) {
+                    self.rejected_without_bead += 1;
+                }
+            }
+            Ok(measured) => {
+                self.width.add(measured.width.get());
+                self.sigma.add(measured.sigma.get());
+                self.roughness = row.roughness;
+                self.saturated.add(measured.hints.saturated_share);
+                self.used.add(measured.hints.used_share);
+                self.contrast.add(measured.hints.contrast_grey);
+                self.blur.add(measured.hints.blur_px);
+                self.noise.add(measured.hints.noise_grey);
+                if let Some(skew) = measured.hints.skew {
+                    self.skew.add(skew.offset_px, skew.variance);
+                }
+            }
+        }
+        if let Some(control) = &mut self.control {
+            control.frame(row);
+        }
+    }
+
+    /// A step of the controller.
+    pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
+        self.moment(Some(now.secs()));
+        self.extruder.step(now, event, step);
+        self.distance.step(step);
+        if let Some(control) = &mut self.control {
+            control.step(now, event, step);
+        }
+    }
+
+    /// The true flow, and the wanted one while bead is laid.
+    pub fn flow(&mut self, wanted: Option<Mm3PerS>, flow: Mm3PerS) {
+        self.extruder.flow(wanted, flow);
+    }
+
+    /// The latency of a setpoint and what its sender waited by its own
+    /// schedule, as the contract defines them.
+    pub fn latency(&mut self, latency_ms: f64, send_wait_ms: f64) {
+        if let Some(control) = &mut self.control {
+            control.latency(latency_ms, send_wait_ms);
+        }
+    }
+
+    /// Another fact.
+    pub fn note(&mut self, note: &Note) {
+        if let Some(control) = &mut self.control {
+            control.note(note);
+        }
+    }
+
+    /// How latencies are distributed \[ms\]; none without a controller.
+    pub fn latencies(&self) -> Option<&Distribution> {
+        self.control.as_ref().map(ControlTally::latencies)
+    }
+
+    /// The sum of it all.
+    pub fn finish(&self) -> Summary {
+        let measured = self.frames - self.rejected.values().sum::<u64>();
+        let hints = self.hints();
+        Summary {
+            frames: self.frames,
+            measured,
+            rejected: self.rejected.clone(),
+            rejected_without_bead: self.control.is_some().then_some(self.rejected_without_bead),
+            width_mean_mm: self.width.mean(),
+            width_std_mm: self.width.std(),
+            sigma_mean_mm: self.sigma.mean(),
+            roughness: self.roughness.map_or_else(Default::default, RoughnessSummary::of),
+            advice: setup::advice(&hints),
+            hints,
+            duration_s: self.first_s.zip(self.last_s).map(|(first, last)| last - first),
+            target_width_mm: self.target.map(Mm::get),
+            control: self.control.as_ref().map(ControlTally::finish),
+            distance: self.distance.finish(),
+            extruder: self.extruder.finish(),
+        }
+    }
+
+    fn hints(&self) -> HintSummary {
+        HintSummary {
+            contrast_median_grey: self.contrast.quantile(0.5),
+            blur_median_px: self.blur.quantile(0.5),
+            noise_median_grey: self.noise.quantile(0.5),
+            saturated_share_mean: self.saturated.mean(),
+            used_share_mean: self.used.mean(),
+            skew_offset_px: self.skew.mean(),
+            skew_offset_sigma_px: self.skew.sigma(),
+        }
+    }
+
+    fn moment(&mut self, time_s: Option<f64>) {
+        if let Some(time_s) = time_s.filter(|time_s| time_s.is_finite()) {
+            self.first_s = Some(self.first_s.map_or(time_s, |first| first.min(time_s)));
+            self.last_s = Some(self.last_s.map_or(time_s, |last| last.max(time_s)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

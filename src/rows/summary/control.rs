@@ -1,0 +1,243 @@
+//! The part of the summary that only a run with a controller has.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::Note;
+use super::follow::{Follower, Lapse};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::Mm;
+use crate::numeric::statistics::{Distribution, Moments};
+use crate::rows::frame_row::FrameRow;
+use crate::rows::names;
+use crate::width_control::{Event, Limit, State, Step};
+
+/// Path length after the start of control from which the bead counts as
+/// settled.
+const SETTLED_AFTER: Mm = Mm::constant(500.0);
+
+/// What control came to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ControlSummary {
+    /// Mean of |measured − wanted| over the bead laid after control began.
+    pub width_error_mean_mm: Option<f64>,
+    /// Root mean square of the same.
+    pub width_error_rms_mm: Option<f64>,
+    /// Root mean square over bead laid more than 500 mm after that.
+    pub width_error_rms_settled_mm: Option<f64>,
+    /// The largest error of the bead laid after control began, with its sign, and where on
+    /// the robot's path that bead lies.
+    pub width_error_worst: Option<Worst>,
+    /// Setpoints that were written to the robot.
+    pub setpoints_sent: u64,
+    /// Time during which a limit shaped the speed.
+    pub limited_s: f64,
+    /// The same for each limit.
+    pub limited_by_s: BTreeMap<&'static str, f64>,
+    /// Time during which the controller held.
+    pub held_s: f64,
+    /// The same for each reason.
+    pub held_for_s: BTreeMap<&'static str, f64>,
+    /// How often the controller gave up.
+    pub faults: u64,
+    /// The same for each reason.
+    pub fault_reasons: BTreeMap<String, u64>,
+    /// Time in each state.
+    pub states_s: BTreeMap<&'static str, f64>,
+    /// From having the frame to having written the first setpoint that uses
+    /// it, less the wait below. Quantiles are within 0.14 %, the maximum is
+    /// exact.
+    pub latency_ms: Quantiles,
+    /// Wait for the fixed-rate sender's turn.
+    pub send_wait_ms: Quantiles,
+    /// Frames that were never looked at, because a newer one was there.
+    pub frames_superseded: u64,
+    /// Frames that the recorder could not keep up with.
+    pub frames_dropped_by_recorder: u64,
+    /// Events or steps that could not be recorded.
+    pub records_lost: u64,
+    /// Whether the link to the robot was ever up.
+    pub was_connected: bool,
+    /// How often the link came up again after it had been up.
+    pub link_reconnects: u64,
+}
+
+/// A width that is further off than all others.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Worst {
+    /// Measured less wanted \[mm\].
+    pub error_mm: f64,
+    /// Robot's path of the bead that it shows \[mm\].
+    pub bead_path_mm: f64,
+}
+
+/// Median, 99 % quantile and maximum; null of nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Quantiles {
+    /// Median.
+    pub p50: Option<f64>,
+    /// What 99 % do not exceed.
+    pub p99: Option<f64>,
+    /// Largest.
+    pub max: Option<f64>,
+}
+
+impl Quantiles {
+    fn of(distribution: &Distribution) -> Self {
+        Self {
+            p50: distribution.quantile(0.5),
+            p99: distribution.quantile(0.99),
+            max: distribution.max(),
+        }
+    }
+}
+
+/// Adds up what control did.
+#[derive(Debug, Default)]
+pub struct ControlTally {
+    follower: Follower,
+    began: Began,
+    error: Moments,
+    error_size: Moments,
+    error_settled: Moments,
+    worst: Option<Worst>,
+    limited_by: Times,
+    held_for: Times,
+    states: Times,
+    fault_reasons: BTreeMap<String, u64>,
+    latency: Distribution,
+    send_wait: Distribution,
+    setpoints: u64,
+    superseded: u64,
+    dropped: u64,
+    records_lost: u64,
+    links: u64,
+}
+
+/// Where on the path of the present bead control began.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+enum Began {
+    #[default]
+    NotYet,
+    At(Mm),
+    /// The bead has ended; widths of it may still be seen, and the next one
+    /// begins anew.
+    Over(Mm),
+}
+
+impl ControlTally {
+    pub fn frame(&mut self, row: &FrameRow) {
+        let (Ok(measured), Some(control)) = (&row.outcome, row.control) else { return };
+        let Some(target) = control.target else { return };
+        let (Began::At(began) | Began::Over(began)) = self.began else { return };
+        let Some(bead) = control.bead_path.filter(|bead| *bead >= began) else { return };
+        // A robot that is not printing shows the camera the same bead again
+        // and again.
+        if control.state == State::Idle.name() {
+            return;
+        }
+        let error = measured.width - target;
+        self.error.add(error.get());
+        self.error_size.add(error.get().abs());
+        if self.worst.is_none_or(|worst| error.get().abs() > worst.error_mm.abs()) {
+            self.worst = Some(Worst { error_mm: error.get(), bead_path_mm: bead.get() });
+        }
+        if bead > began + SETTLED_AFTER {
+            self.error_settled.add(error.get());
+        }
+    }
+
+    pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
+        if matches!(event, Event::LinkUp { .. }) {
+            self.links += 1;
+        }
+        let before = self.follower.state().clone();
+        if let Some(lapse) = self.follower.step(now, event, step) {
+            self.spend(&lapse);
+        }
+        if let State::Fault(why) = &step.state
+            && !matches!(before, State::Fault(_))
+        {
+            *self.fault_reasons.entry(names::fault(why)).or_default() += 1;
+        }
+        self.began = match (&step.state, self.began) {
+            (State::Priming, _) => Began::NotYet,
+            (State::Idle, Began::At(path)) => Began::Over(path),
+            (State::Tracking, Began::NotYet | Began::Over(_)) => {
+                let path = self.follower.path().or(step.trace.nozzle_path_mm);
+                path.map_or(Began::NotYet, Began::At)
+            }
+            (_, began) => began,
+        };
+    }
+
+    pub fn latency(&mut self, latency_ms: f64, send_wait_ms: f64) {
+        self.latency.add(latency_ms);
+        self.send_wait.add(send_wait_ms);
+    }
+
+    pub fn note(&mut self, note: &Note) {
+        match note {
+            Note::SetpointSent => self.setpoints += 1,
+            Note::FramesSuperseded(more) => self.superseded += more,
+            Note::FramesDroppedByRecorder(more) => self.dropped += more,
+            Note::RecordsLost(more) => self.records_lost += more,
+            Note::Remark(_) => {}
+        }
+    }
+
+    pub fn latencies(&self) -> &Distribution {
+        &self.latency
+    }
+
+    pub fn finish(&self) -> ControlSummary {
+        ControlSummary {
+            width_error_mean_mm: self.error_size.mean(),
+            width_error_rms_mm: self.error.rms(),
+            width_error_rms_settled_mm: self.error_settled.rms(),
+            width_error_worst: self.worst,
+            setpoints_sent: self.setpoints,
+            limited_s: total(&self.limited_by),
+            limited_by_s: seconds(&self.limited_by),
+            held_s: total(&self.held_for),
+            held_for_s: seconds(&self.held_for),
+            faults: self.fault_reasons.values().sum(),
+            fault_reasons: self.fault_reasons.clone(),
+            states_s: seconds(&self.states),
+            latency_ms: Quantiles::of(&self.latency),
+            send_wait_ms: Quantiles::of(&self.send_wait),
+            frames_superseded: self.superseded,
+            frames_dropped_by_recorder: self.dropped,
+            records_lost: self.records_lost,
+            was_connected: self.links > 0,
+            link_reconnects: self.links.saturating_sub(1),
+        }
+    }
+
+    fn spend(&mut self, lapse: &Lapse) {
+        spend(&mut self.states, lapse.state.name(), lapse.span);
+        if let State::Holding(why) = &lapse.state {
+            spend(&mut self.held_for, names::hold(why), lapse.span);
+        }
+        if lapse.limit != Limit::None {
+            spend(&mut self.limited_by, names::limit(lapse.limit), lapse.span);
+        }
+    }
+}
+
+/// Time for each reason, summed without rounding.
+type Times = BTreeMap<&'static str, Span>;
+
+fn spend(times: &mut Times, reason: &'static str, span: Span) {
+    let sum = times.entry(reason).or_default();
+    *sum = *sum + span;
+}
+
+fn seconds(times: &Times) -> BTreeMap<&'static str, f64> {
+    times.iter().map(|(reason, span)| (*reason, span.secs())).collect()
+}
+
+fn total(times: &Times) -> f64 {
+    times.values().fold(Span::ZERO, |sum, span| sum + *span).secs()
+}

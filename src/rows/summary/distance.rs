@@ -1,0 +1,98 @@
+//! What the law by distance made of the widths.
+
+use serde::Serialize;
+
+use crate::width_control::distance::Use;
+use crate::width_control::{DistanceTrace, Distrust, Step};
+
+/// Widths by what became of them, and what was believed at last.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DistanceSummary {
+    /// Widths that were taken.
+    pub taken: u64,
+    /// Widths that were left as outliers.
+    pub outliers: u64,
+    /// Changes of the flow that were found.
+    pub changes: u64,
+    /// Widths of bead whose speed was not known.
+    pub not_paired: u64,
+    /// Width at the start speed \[mm\].
+    pub level_mm: f64,
+    /// Its standard deviation \[mm\].
+    pub level_sigma_mm: f64,
+    /// Exponent b.
+    pub exponent: f64,
+    /// Where the camera seems to look \[mm\].
+    pub offset_mm: f64,
+    /// Period of a pulsation, where one was seen \[s\].
+    pub pulsation_s: Option<f64>,
+    /// Why the PI law took over, if it did.
+    pub fallback: Option<Distrust>,
+}
+
+impl DistanceSummary {
+    /// In a sentence or two.
+    pub fn words(&self) -> String {
+        let Self { taken, outliers, changes, level_mm, exponent, offset_mm, .. } = self;
+        let pulsation = self.pulsation_s.map_or(String::new(), |period| {
+            format!(" The flow pulsates with a period of {period:.2} s.")
+        });
+        let fallback = self.fallback.map_or("", |why| match why {
+            Distrust::NoPath => " The PI law took over: the robot reports no path.",
+            Distrust::Unpaired => {
+                " The PI law took over: the bead under the camera is none whose speed is known; is \
+                 offset_mm right?"
+            }
+            Distrust::ModelContradicted => {
+                " The PI law took over: the width did not answer the speed as the model says."
+            }
+        });
+        format!(
+            "Widths taken {taken}, outliers {outliers}, changes of the flow {changes}. At last the \
+             bead was believed to be {level_mm:.2} mm wide at the start speed, with b = \
+             {exponent:.3}, seen {offset_mm:.1} mm behind the nozzle.{pulsation}{fallback}"
+        )
+    }
+}
+
+/// Adds up what became of widths.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct DistanceTally {
+    counts: [u64; 4],
+    last: Option<DistanceTrace>,
+    fallback: Option<Distrust>,
+}
+
+impl DistanceTally {
+    /// A step of the controller.
+    pub fn step(&mut self, step: &Step) {
+        self.fallback = self.fallback.or(step.trace.fallback);
+        let Some(trace) = step.trace.distance else { return };
+        let which = match trace.use_of_width {
+            Use::Taken => 0,
+            Use::Outlier => 1,
+            Use::Change => 2,
+            Use::NotPaired => 3,
+        };
+        self.counts[which] += 1;
+        self.last = Some(trace);
+    }
+
+    /// The sum; none where the law was not asked for.
+    pub fn finish(&self) -> Option<DistanceSummary> {
+        let last = self.last?;
+        let [taken, outliers, changes, not_paired] = self.counts;
+        Some(DistanceSummary {
+            taken,
+            outliers,
+            changes,
+            not_paired,
+            level_mm: last.level_mm.get(),
+            level_sigma_mm: last.level_sigma_mm.get(),
+            exponent: last.exponent,
+            offset_mm: last.offset_mm.get(),
+            pulsation_s: last.pulsation_s,
+            fallback: self.fallback,
+        })
+    }
+}

@@ -1,0 +1,78 @@
+//! Follows a controller through its events and steps: in which state it was
+//! for how long, which limit acted, and where the nozzle is.
+
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm, MmPerS};
+use crate::width_control::{Command, Event, Limit, State, Step};
+
+/// Where a run stands after the steps that it has seen.
+#[derive(Debug, Default)]
+pub struct Follower {
+    now: Option<Stamp>,
+    state: State,
+    limit: Limit,
+    path: Option<Mm>,
+    setpoint: Option<MmPerS>,
+}
+
+/// The time between two steps, and how it was spent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lapse {
+    /// How long it lasted.
+    pub span: Span,
+    /// The state during it.
+    pub state: State,
+    /// The limit that acted during it.
+    pub limit: Limit,
+}
+
+impl Follower {
+    /// Takes the next step and tells of the time before it; nothing is before
+    /// the first. A limit acts from the step that names it to the next
+    /// setpoint without it.
+    pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) -> Option<Lapse> {
+        let lapse = self.now.map(|then| Lapse {
+            span: (now - then).max(Span::ZERO),
+            state: self.state.clone(),
+            limit: self.limit,
+        });
+        self.now = Some(now);
+        self.state = step.state.clone();
+        if let Event::Robot(robot) = event {
+            self.path = Some(robot.path_mm);
+        }
+        match step.command {
+            Some(Command::Speed(speed)) => {
+                self.setpoint = Some(speed);
+                self.limit = step.trace.limit;
+            }
+            Some(Command::Stop) => self.limit = Limit::None,
+            None if step.trace.limit != Limit::None => self.limit = step.trace.limit,
+            None => {}
+        }
+        if matches!(step.state, State::Idle | State::Fault(_)) {
+            self.limit = Limit::None;
+        }
+        lapse
+    }
+
+    /// The state after the last step.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// The limit that acts after the last step.
+    pub fn limit(&self) -> Limit {
+        self.limit
+    }
+
+    /// The nozzle's distance along the path, as the robot last reported it.
+    pub fn path(&self) -> Option<Mm> {
+        self.path
+    }
+
+    /// The last setpoint that was commanded.
+    pub fn setpoint(&self) -> Option<MmPerS> {
+        self.setpoint
+    }
+}

@@ -1,0 +1,177 @@
+//! Feeds recorded events to a controller and compares its steps with the
+//! recorded ones, bit for bit.
+
+use crate::core::time::Stamp;
+use crate::io::recording::{Entry, RecordingError};
+use crate::width_control::{Event, Step};
+
+/// The first step that came out differently.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Difference {
+    /// Number of the event.
+    pub n: u64,
+    /// When the controller was told.
+    pub now: Stamp,
+    /// What it was told.
+    pub event: Event,
+    /// What it answered in the run.
+    pub recorded: Step,
+    /// What it answers now.
+    pub replayed: Step,
+}
+
+/// Events that are missing from the middle of a recording. What comes after
+/// cannot be compared, because the controller has not seen them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Gap {
+    /// First event that is missing, with its step or without.
+    pub expected: u64,
+    /// Event or step that stands in its place.
+    pub found: u64,
+}
+
+/// How a replay went.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ReplayReport {
+    /// Steps that were compared; all the same, but for the last where there
+    /// is a difference.
+    pub compared: u64,
+    /// Where the replay left the recording. It ends there.
+    pub difference: Option<Difference>,
+    /// Where events are missing. The replay ends there.
+    pub gap: Option<Gap>,
+    /// An event at the end whose step was not recorded any more.
+    pub unanswered: Option<u64>,
+}
+
+/// Replays a recording. `step` is the controller, fresh from its
+/// configuration. Fails where the recording cannot be read on.
+pub fn replay(
+    entries: impl IntoIterator<Item = Result<Entry, RecordingError>>,
+    mut step: impl FnMut(Stamp, &Event) -> Step,
+) -> Result<ReplayReport, RecordingError> {
+    let mut report = ReplayReport::default();
+    let mut open: Option<(u64, Stamp, Event, Step)> = None;
+    for entry in entries {
+        match entry? {
+            Entry::Frame(_) => {}
+            Entry::Event { n, now, event } => {
+                let expected = report.compared;
+                if open.is_some() || n != expected {
+                    report.gap = Some(Gap { expected, found: n });
+                    return Ok(report);
+                }
+                let replayed = step(now, &event);
+                open = Some((n, now, event, replayed));
+            }
+            Entry::Step { n, step: recorded, .. } => {
+                let Some((_, now, event, replayed)) = open.take_if(|(open, ..)| *open == n) else {
+                    report.gap = Some(Gap { expected: report.compared, found: n });
+                    return Ok(report);
+                };
+                report.compared += 1;
+                if !same_bits(&recorded, &replayed) {
+                    report.difference =
+                        Some(Difference { n, now, event, recorded: *recorded, replayed });
+                    return Ok(report);
+                }
+            }
+        }
+    }
+    report.unanswered = open.map(|(n, ..)| n);
+    Ok(report)
+}
+
+/// Equal down to the sign of a zero: the shortest decimal of a float stands
+/// for one bit pattern only.
+fn same_bits(a: &Step, b: &Step) -> bool {
+    match (serde_json::to_string(a), serde_json::to_string(b)) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::core::units::Mm;
+    use crate::run::replay::*;
+    use crate::width_control::{State, Trace};
+
+    /// A controller with memory: the error is the sum of what it has seen.
+    fn controller() -> impl FnMut(Stamp, &Event) -> Step {
+        let mut sum = 0.0;
+        move |_, event| {
+            if let Event::Measured { width_mm, .. } = event {
+                sum += width_mm.get();
+            }
+            let trace = Trace { error_mm: Mm::new(sum).ok(), ..Trace::default() };
+            Step { state: State::Tracking, trace, ..Step::default() }
+        }
+    }
+
+    fn recorded(count: u32) -> Vec<Entry> {
+        let mut controller = controller();
+        let mut entries = Vec::new();
+        for frame in 0..count {
+            let n = u64::from(frame);
+            let now = Stamp::from_ns(n * 20_000_000);
+            let event = Event::Measured {
+                frame: n,
+                captured_at: now,
+                width_mm: Mm::constant(0.1 * f64::from(frame)),
+                sigma_mm: Mm::constant(0.05),
+            };
+            let step = controller(now, &event);
+            entries.push(Entry::Event { n, now, event });
+            entries.push(Entry::Step { n, now, step: Box::new(step) });
+        }
+        entries
+    }
+
+    fn replayed(entries: Vec<Entry>) -> ReplayReport {
+        replay(entries.into_iter().map(Ok), controller()).unwrap()
+    }
+
+    #[test]
+    fn the_same_controller_gives_the_same_steps() {
+        let report = replayed(recorded(50));
+        assert_eq!(report, ReplayReport { compared: 50, ..ReplayReport::default() });
+    }
+
+    #[test]
+    fn one_bit_is_a_difference() {
+        let mut entries = recorded(20);
+        let Entry::Step { step, .. } = &mut entries[15] else { panic!("a step was expected") };
+        let error = step.trace.error_mm.unwrap().get();
+        step.trace.error_mm = Mm::new(f64::from_bits(error.to_bits() + 1)).ok();
+        let report = replayed(entries);
+        let difference = report.difference.unwrap();
+        assert_eq!((report.compared, difference.n), (8, 7));
+        assert_eq!(difference.replayed.trace.error_mm.unwrap().get().to_bits(), error.to_bits());
+    }
+
+    #[test]
+    fn the_sign_of_a_zero_is_a_difference() {
+        let mut entries = recorded(1);
+        let Entry::Step { step, .. } = &mut entries[1] else { panic!("a step was expected") };
+        step.trace.error_mm = Some(Mm::constant(-0.0));
+        assert_eq!(replayed(entries).difference.unwrap().n, 0);
+    }
+
+    #[test]
+    fn a_cut_recording_is_replayed_as_far_as_it_goes() {
+        let mut entries = recorded(10);
+        entries.truncate(13);
+        let report = replayed(entries);
+        assert_eq!((report.compared, report.unanswered, report.gap), (6, Some(6), None));
+    }
+
+    #[test]
+    fn nothing_is_compared_behind_a_gap() {
+        let mut entries = recorded(10);
+        entries.drain(6..10);
+        let report = replayed(entries);
+        assert_eq!((report.compared, report.difference), (3, None));
+        assert_eq!(report.gap, Some(Gap { expected: 3, found: 5 }));
+    }
+}

@@ -1,0 +1,134 @@
+//! Drives a controller and what it is plugged into: every event goes through
+//! here, whether the cell is live or simulated.
+
+use super::ports::{ExtruderPort, NoExtruder, RecordError, Recorder, RobotPort};
+use crate::control::Controller;
+use crate::core::time::Stamp;
+use crate::width_control::{Event, Step};
+
+/// A controller with its robot, its recorder and its extruder.
+#[derive(Debug)]
+pub struct Runner<R, K, X = NoExtruder> {
+    controller: Controller,
+    robot: R,
+    extruder: X,
+    recorder: K,
+    failure: Option<RecordError>,
+}
+
+/// What became of an event.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Handled {
+    /// The controller's answer.
+    pub step: Step,
+    /// Number of the line that was sent to the robot, if one was.
+    pub sent: Option<u64>,
+}
+
+impl<R: RobotPort, K: Recorder> Runner<R, K> {
+    /// Plugs a controller in whose extruder goes its own way.
+    pub fn new(controller: Controller, robot: R, recorder: K) -> Self {
+        Self::with_extruder(controller, robot, NoExtruder, recorder)
+    }
+}
+
+impl<R: RobotPort, K: Recorder, X: ExtruderPort> Runner<R, K, X> {
+    /// Plugs a controller in.
+    pub fn with_extruder(controller: Controller, robot: R, extruder: X, recorder: K) -> Self {
+        Self { controller, robot, extruder, recorder, failure: None }
+    }
+
+    /// Answers an event: step, send, record, in this order, so that the disk
+    /// is never between a decision and the machine. Where both sides are told
+    /// something, as at the end of a run, the extruder is told first: a robot
+    /// that stops under a running pump is worse than the other way round. What
+    /// cannot be recorded ends control in hold.
+    pub fn handle(&mut self, now: Stamp, event: &Event) -> Handled {
+        let step = self.controller.step(now, event);
+        if let Some(command) = step.extruder.and_then(|extruder| extruder.command) {
+            let _ = self.extruder.send(now, command);
+        }
+        let sent = step.command.and_then(|command| self.robot.send(now, command));
+        if self.failure.is_none()
+            && let Err(error) = self.recorder.record(now, event, &step)
+        {
+            self.lose_recording(now, error);
+        }
+        Handled { step, sent }
+    }
+
+    /// Tells the controller that the recording is lost.
+    pub fn lose_recording(&mut self, now: Stamp, error: RecordError) {
+        if self.failure.is_none() {
+            self.failure = Some(error);
+            let _ = self.controller.step(now, &Event::RecordingLost);
+        }
+    }
+
+    /// Why the recording was lost, if it was.
+    pub fn failure(&self) -> Option<&RecordError> {
+        self.failure.as_ref()
+    }
+
+    /// The robot's side.
+    pub fn robot_mut(&mut self) -> &mut R {
+        &mut self.robot
+    }
+
+    /// The extruder's side.
+    pub fn extruder_mut(&mut self) -> &mut X {
+        &mut self.extruder
+    }
+
+    /// Takes everything apart at the end.
+    pub fn into_parts(self) -> (Controller, R, K) {
+        (self.controller, self.robot, self.recorder)
+    }
+}
+
+/// Keeps nothing, for cells that are not recorded.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NoRecorder;
+
+impl Recorder for NoRecorder {
+    fn record(&mut self, _: Stamp, _: &Event, _: &Step) -> Result<(), RecordError> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::run::runner::*;
+    use crate::width_control::{Command, Hold, State};
+
+    struct NoRobot;
+
+    impl RobotPort for NoRobot {
+        fn send(&mut self, _: Stamp, _: Command) -> Option<u64> {
+            None
+        }
+    }
+
+    struct FullDisk {
+        room: usize,
+    }
+
+    impl Recorder for FullDisk {
+        fn record(&mut self, _: Stamp, _: &Event, _: &Step) -> Result<(), RecordError> {
+            self.room = self.room.checked_sub(1).ok_or(RecordError("disk full".into()))?;
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn control_ends_in_hold_when_the_disk_is_full() {
+        let controller = Controller::new(crate::control::example_setup());
+        let mut runner = Runner::new(controller, NoRobot, FullDisk { room: 2 });
+        for _ in 0..3 {
+            assert_eq!(runner.handle(Stamp::START, &Event::Tick).step.state, State::Idle);
+        }
+        assert_eq!(runner.failure(), Some(&RecordError("disk full".into())));
+        let after = runner.handle(Stamp::START, &Event::Tick);
+        assert_eq!(after.step.state, State::Holding(Hold::RecordingLost));
+    }
+}

@@ -1,0 +1,6 @@
+//! What a simulated bead, its image and its world are made of: plain parameters, read strictly from a cell file.
+
+pub mod bead;
+pub mod disturbance;
+pub mod image;
+pub mod table;

@@ -1,0 +1,80 @@
+//! How wide a bead comes out.
+
+/// Width as a power of the speed at which the bead is laid, in two pieces that
+/// meet: w = A·(v/v₀)^−b. Mass conservation (b = 1) does not describe the bead
+/// of Shojaei Barjuei et al. 2022: their table 2 gives exponents near 0.25,
+/// because the strand is stretched below the nozzle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BeadModel {
+    /// Width at the reference speed \[mm\].
+    pub width_mm: f64,
+    /// Reference speed \[mm/s\].
+    pub at_speed_mm_per_s: f64,
+    /// Exponent b.
+    pub exponent: f64,
+    /// Speed below which the other exponent holds \[mm/s\]; 0 for never.
+    pub slow_below_mm_per_s: f64,
+    /// Exponent b below that speed.
+    pub slow_exponent: f64,
+}
+
+/// Waviness of a bead's edges.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Roughness {
+    /// Standard deviation of the width along the bead \[mm\].
+    pub size_mm: f64,
+    /// Length over which it is correlated \[mm\].
+    pub length_mm: f64,
+}
+
+impl BeadModel {
+    /// Slowest speed that the model is asked about \[mm/s\]; a bead laid at
+    /// rest would have no bound.
+    const SLOWEST_MM_PER_S: f64 = 1.0;
+
+    /// The plant fitted to tables 1 and 2 of the 2022 paper.
+    pub fn fitted_2022() -> Self {
+        Self {
+            width_mm: 38.61,
+            at_speed_mm_per_s: 112.5,
+            exponent: 0.221,
+            slow_below_mm_per_s: 76.90,
+            slow_exponent: 0.267,
+        }
+    }
+
+    /// Width of a bead laid at a speed \[mm/s\], at the nominal flow \[mm\].
+    pub fn width_at(&self, speed_mm_per_s: f64) -> f64 {
+        let speed = speed_mm_per_s.max(Self::SLOWEST_MM_PER_S);
+        let knee = self.slow_below_mm_per_s;
+        if speed >= knee {
+            self.width_mm * (speed / self.at_speed_mm_per_s).powf(-self.exponent)
+        } else {
+            let at_knee = self.width_mm * (knee / self.at_speed_mm_per_s).powf(-self.exponent);
+            at_knee * (speed / knee).powf(-self.slow_exponent)
+        }
+    }
+
+    /// Exponent that holds at a speed \[mm/s\].
+    pub fn exponent_at(&self, speed_mm_per_s: f64) -> f64 {
+        if speed_mm_per_s >= self.slow_below_mm_per_s { self.exponent } else { self.slow_exponent }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scenario::bead::*;
+
+    #[test]
+    fn the_pieces_of_the_fitted_bead_meet_at_42_mm() {
+        let bead = BeadModel::fitted_2022();
+        assert!((bead.width_at(112.5) - 38.61).abs() < 1e-12);
+        assert!((bead.width_at(76.90) - 42.0).abs() < 0.01);
+        assert!((bead.width_at(76.90 - 1e-9) - bead.width_at(76.90)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_bead_at_rest_has_a_width() {
+        assert!(BeadModel::fitted_2022().width_at(0.0).is_finite());
+    }
+}

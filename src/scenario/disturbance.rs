@@ -1,0 +1,69 @@
+//! What the pump does to the flow, along the path and over time.
+
+use std::f64::consts::TAU;
+
+/// Flow against its nominal value, along the path and over time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flow {
+    /// Path length at which the flow steps \[mm\].
+    pub step_at_mm: f64,
+    /// Flow from there on, as a share of the nominal flow.
+    pub step_ratio: f64,
+    /// Amplitude of a sine, as a share of the nominal flow.
+    pub wave_share: f64,
+    /// Its length along the path \[mm\].
+    pub wavelength_mm: f64,
+    /// Amplitude of a pulsation over time, as a share of the nominal flow.
+    pub pulse_share: f64,
+    /// Its period \[s\].
+    pub pulse_period_s: f64,
+    /// How far it wanders along a metre of path, as a share (standard deviation).
+    pub drift_per_root_m: f64,
+}
+
+impl Flow {
+    /// A pump that does nothing to the flow.
+    pub const STEADY: Self = Self {
+        step_at_mm: 0.0,
+        step_ratio: 1.0,
+        wave_share: 0.0,
+        wavelength_mm: 1000.0,
+        pulse_share: 0.0,
+        pulse_period_s: 1.0,
+        drift_per_root_m: 0.0,
+    };
+
+    /// The pulsation at a time \[s\] with a phase in periods, as a share of the
+    /// nominal flow.
+    pub fn pulse_at(&self, at_s: f64, phase: f64) -> f64 {
+        1.0 + self.pulse_share * (TAU * (at_s / self.pulse_period_s + phase)).sin()
+    }
+
+    /// Flow at a path length, as a share of the nominal flow.
+    pub fn ratio_at(&self, path_mm: f64) -> f64 {
+        let step = if path_mm >= self.step_at_mm { self.step_ratio } else { 1.0 };
+        step * (1.0 + self.wave_share * (TAU * path_mm / self.wavelength_mm).sin())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scenario::disturbance::*;
+
+    #[test]
+    fn a_step_and_a_wave_multiply() {
+        let flow = Flow {
+            step_at_mm: 100.0,
+            step_ratio: 0.92,
+            wave_share: 0.1,
+            wavelength_mm: 400.0,
+            pulse_share: 0.2,
+            pulse_period_s: 2.0,
+            ..Flow::STEADY
+        };
+        assert!((flow.pulse_at(0.5, 0.0) - 1.2).abs() < 1e-12);
+        assert!((flow.pulse_at(0.5, 0.5) - 0.8).abs() < 1e-12);
+        assert_eq!(flow.ratio_at(0.0), 1.0);
+        assert!((flow.ratio_at(100.0) - 0.92 * 1.1).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,5 @@
+//! The far side of both line links: a robot and an extruder behind a socket.
+
+pub mod extruder;
+pub mod robot;
+pub mod server;

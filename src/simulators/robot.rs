@@ -1,0 +1,155 @@
+//! A robot that is not there: [`RobotCell`] behind a real TCP socket.
+
+use std::collections::VecDeque;
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use super::server::Server;
+use crate::core::time::{Span, Stamp};
+use crate::core::units::Mm;
+use crate::io::clock::RunClock;
+use crate::link::{Faults, Job, ParamError, RobotCell, RobotParams};
+use crate::width_control::{RobotMode, RobotState};
+
+mod machine;
+
+pub use super::server::Notice;
+use machine::RobotMachine;
+
+/// Samples of the truth that are kept; at 50 a second more than an hour.
+const LONGEST_HISTORY: usize = 200_000;
+
+/// What is simulated.
+#[derive(Debug, Clone)]
+pub struct SimOptions {
+    /// The robot.
+    pub params: RobotParams,
+    /// What it prints by itself while a PC is connected.
+    pub job: Job,
+    /// Time between two `STATE` lines, 20 to 200 ms on a robot that keeps to
+    /// the link.
+    pub state_period: Span,
+}
+
+/// Where the robot really was.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Truth {
+    /// When.
+    pub at: Stamp,
+    /// Its state.
+    pub state: RobotState,
+}
+
+/// The robot cannot be started.
+#[derive(Debug, thiserror::Error)]
+pub enum SimError {
+    /// A robot that cannot be.
+    #[error(transparent)]
+    Params(#[from] ParamError),
+    /// The time between two `STATE` lines.
+    #[error("the time between two STATE lines must be above zero")]
+    Period,
+    /// The system gives no socket or thread.
+    #[error("the simulated robot cannot be started: {0}")]
+    Io(#[from] io::Error),
+}
+
+/// A simulated robot that runs in threads of its own until it is stopped.
+#[derive(Debug)]
+pub struct RobotSim {
+    shared: Arc<Shared>,
+    server: Server,
+}
+
+/// What the robot's thread shares with the handle.
+#[derive(Debug)]
+struct Shared {
+    clock: RunClock,
+    cell: Mutex<RobotCell>,
+    history: Mutex<VecDeque<Truth>>,
+}
+
+impl Shared {
+    fn cell(&self) -> MutexGuard<'_, RobotCell> {
+        self.cell.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn history(&self) -> MutexGuard<'_, VecDeque<Truth>> {
+        self.history.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn remember(&self, at: Stamp, state: RobotState) {
+        let mut history = self.history();
+        if history.len() == LONGEST_HISTORY {
+            history.pop_front();
+        }
+        history.push_back(Truth { at, state });
+    }
+}
+
+impl RobotSim {
+    /// Serves the link on `listener`. `clock` may be the PC's own: what the
+    /// robot says of its time is shifted by
+    /// [`RobotParams::clock_start_ms`].
+    pub fn spawn(
+        listener: TcpListener,
+        clock: RunClock,
+        options: SimOptions,
+        notice: Notice,
+    ) -> Result<Self, SimError> {
+        if options.state_period <= Span::ZERO {
+            return Err(SimError::Period);
+        }
+        let cell = RobotCell::new(options.params, clock.now())?;
+        let shared = Arc::new(Shared { clock, cell: Mutex::new(cell), history: Mutex::default() });
+        let machine = RobotMachine::new(Arc::clone(&shared), options.job);
+        let server = Server::spawn(listener, clock, options.state_period, machine, notice)?;
+        Ok(Self { shared, server })
+    }
+
+    /// Where it listens.
+    pub fn local_addr(&self) -> SocketAddr {
+        self.server.local_addr()
+    }
+
+    /// Its true state now.
+    pub fn state(&self) -> RobotState {
+        self.shared.cell().state(self.shared.clock.now())
+    }
+
+    /// Its true states so far, one for every `STATE` period, the oldest first.
+    pub fn history(&self) -> Vec<Truth> {
+        self.shared.history().iter().copied().collect()
+    }
+
+    /// Begins a bead at a height, as an operator would; says whether it did.
+    pub fn begin_bead(&self, z: Mm) -> bool {
+        self.shared.cell().begin_bead(self.shared.clock.now(), z)
+    }
+
+    /// Leaves `STOP` or `FAULT`, as an operator would.
+    pub fn acknowledge(&self) {
+        self.shared.cell().acknowledge(self.shared.clock.now());
+    }
+
+    /// Stops with a fault of its own.
+    pub fn fail(&self) {
+        self.shared.cell().fail(self.shared.clock.now());
+    }
+
+    /// Misbehaves from now on.
+    pub fn set_faults(&self, faults: Faults) {
+        self.shared.cell().set_faults(self.shared.clock.now(), faults);
+    }
+
+    /// What it does.
+    pub fn mode(&self) -> RobotMode {
+        self.state().mode
+    }
+
+    /// Closes all sockets and ends the threads.
+    pub fn stop(self) {
+        self.server.stop();
+    }
+}

@@ -1,0 +1,77 @@
+//! The simulated robot behind its server.
+
+use std::sync::Arc;
+
+use super::Shared;
+use crate::core::time::Stamp;
+use crate::link::robot_line::mode_word;
+use crate::link::{Job, LineError, PcLine, RobotLine};
+use crate::simulators::server::{Answer, Machine, Taken};
+use crate::width_control::RobotMode;
+
+pub(super) struct RobotMachine {
+    shared: Arc<Shared>,
+    job: Job,
+    mode: RobotMode,
+}
+
+impl RobotMachine {
+    pub(super) fn new(shared: Arc<Shared>, job: Job) -> Self {
+        Self { shared, job, mode: RobotMode::Idle }
+    }
+}
+
+impl Machine for RobotMachine {
+    const NAME: &'static str = "robot-sim";
+    const LEFT: &'static str = "the last setpoint";
+
+    fn tick(&mut self, now: Stamp) -> Option<String> {
+        let (state, report) = {
+            let mut cell = self.shared.cell();
+            self.job.advance(now, &mut cell);
+            (cell.state(now), cell.report(now).filter(|_| cell.greeted()))
+        };
+        self.shared.remember(now, state);
+        report.map(|report| report.format())
+    }
+
+    fn connected(&mut self, now: Stamp) {
+        let mut cell = self.shared.cell();
+        cell.connect(now);
+        self.job.connected(cell.mode());
+    }
+
+    fn disconnected(&mut self, now: Stamp) {
+        self.shared.cell().disconnect(now);
+    }
+
+    fn take(&mut self, now: Stamp, text: &str) -> Result<Taken, LineError> {
+        let line = PcLine::parse(text)?;
+        let answer = self.shared.cell().take(now, line).map(answer);
+        Ok(Taken { answer, bye: line == PcLine::Bye })
+    }
+
+    fn bad_line(&mut self, why: &str) -> Answer {
+        answer(self.shared.cell().bad_line(why))
+    }
+
+    fn news(&mut self, now: Stamp) -> Option<String> {
+        let state = self.shared.cell().state(now);
+        if state.mode == self.mode {
+            return None;
+        }
+        let (from, to) = (mode_word(self.mode), mode_word(state.mode));
+        self.mode = state.mode;
+        let (path, z) = (state.path_mm.get(), state.z_mm.get());
+        Some(format!("{from} -> {to} at path {path:.1} mm, z {z:.1} mm"))
+    }
+}
+
+fn answer(line: RobotLine) -> Answer {
+    let text = line.format();
+    let refused = match line {
+        RobotLine::Err { seq, code, text } => Some((seq, code, text)),
+        _ => None,
+    };
+    Answer { line: text, refused }
+}

@@ -1,0 +1,167 @@
+//! The far side of a line link over TCP, for robots and extruders that are not
+//! there: one PC at a time, lines in, `STATE` out.
+
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{Builder, JoinHandle};
+use std::time::Duration;
+
+use crossbeam_channel::{Sender, after, bounded};
+
+use crate::core::time::{Span, Stamp};
+use crate::io::clock::RunClock;
+use crate::link::{ErrCode, LineError};
+
+mod host;
+mod peer;
+
+use host::{Host, Input};
+
+/// Pieces of input that may wait; senders then wait too.
+const WAITING_INPUTS: usize = 64;
+/// How long a call on the server's own socket may take when it is woken to end.
+const WAKE: Duration = Duration::from_millis(200);
+
+/// Is told what happens, in words for the person who watches.
+pub type Notice = Box<dyn FnMut(Stamp, &str) + Send>;
+
+/// What stands behind a server.
+pub trait Machine: Send + 'static {
+    /// Name of its threads.
+    const NAME: &'static str;
+    /// What a PC leaves behind, such as `the last setpoint`.
+    const LEFT: &'static str;
+
+    /// Once every period: goes on, and gives the `STATE` to send, if there is
+    /// somebody to hear it.
+    fn tick(&mut self, now: Stamp) -> Option<String>;
+
+    /// A PC called.
+    fn connected(&mut self, now: Stamp);
+
+    /// The PC is gone.
+    fn disconnected(&mut self, now: Stamp);
+
+    /// Takes a line without LF; fails where it makes no sense.
+    fn take(&mut self, now: Stamp, text: &str) -> Result<Taken, LineError>;
+
+    /// The answer to bytes that make no line.
+    fn bad_line(&mut self, why: &str) -> Answer;
+
+    /// What has changed since it was last asked, in words, if anything.
+    fn news(&mut self, now: Stamp) -> Option<String>;
+}
+
+/// What became of a line.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Taken {
+    /// What to answer.
+    pub answer: Option<Answer>,
+    /// Whether it was the last one.
+    pub bye: bool,
+}
+
+/// A line to the PC.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Answer {
+    /// The line with its LF.
+    pub line: String,
+    /// Number of the line that it refuses, and why, where it does.
+    pub refused: Option<(u64, ErrCode, String)>,
+}
+
+/// A machine that is served in threads of its own until it is stopped.
+#[derive(Debug)]
+pub struct Server {
+    quitting: Arc<AtomicBool>,
+    inputs: Sender<Input>,
+    address: SocketAddr,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Server {
+    /// Serves a machine on `listener`, which is told of the time by `clock`
+    /// and says its `STATE` once every `period`.
+    pub fn spawn<M: Machine>(
+        listener: TcpListener,
+        clock: RunClock,
+        period: Span,
+        machine: M,
+        notice: Notice,
+    ) -> io::Result<Self> {
+        let address = listener.local_addr()?;
+        let (inputs, received) = bounded(WAITING_INPUTS);
+        let quitting = Arc::new(AtomicBool::new(false));
+        let host = Host::new(machine, clock, inputs.clone(), period, notice);
+        let serve = Builder::new().name(M::NAME.to_owned());
+        let mut threads = vec![serve.spawn(move || host.run(&received))?];
+        let (ended, connections) = (Arc::clone(&quitting), inputs.clone());
+        let accept = Builder::new().name(format!("{}-accept", M::NAME));
+        threads.push(accept.spawn(move || accept_all(&listener, &ended, &connections))?);
+        Ok(Self { quitting, inputs, address, threads })
+    }
+
+    /// Where it listens.
+    pub const fn local_addr(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Closes all sockets and ends the threads.
+    pub fn stop(mut self) {
+        self.end();
+    }
+
+    fn end(&mut self) {
+        if self.threads.is_empty() {
+            return;
+        }
+        self.quitting.store(true, Ordering::Release);
+        // Fails only where the thread has ended already.
+        let _ = self.inputs.send(Input::Quit);
+        let _ = TcpStream::connect_timeout(&reachable(self.address), WAKE);
+        for thread in self.threads.drain(..) {
+            if thread.join().is_err() {
+                tracing::error!("a thread of the simulated machine had failed");
+            }
+        }
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+fn accept_all(listener: &TcpListener, quitting: &AtomicBool, inputs: &Sender<Input>) {
+    for connection in listener.incoming() {
+        if quitting.load(Ordering::Acquire) {
+            return;
+        }
+        match connection {
+            Ok(stream) => {
+                if inputs.send(Input::Connection(stream)).is_err() {
+                    return;
+                }
+            }
+            Err(error) => {
+                tracing::warn!(%error, "a connection could not be accepted");
+                // What is short, such as file handles, needs time to return.
+                let _ = after(WAKE).recv();
+            }
+        }
+    }
+}
+
+/// An address that listens everywhere is called on this machine.
+fn reachable(mut address: SocketAddr) -> SocketAddr {
+    if address.ip().is_unspecified() {
+        address.set_ip(match address.ip() {
+            IpAddr::V4(_) => IpAddr::V4(Ipv4Addr::LOCALHOST),
+            IpAddr::V6(_) => IpAddr::V6(Ipv6Addr::LOCALHOST),
+        });
+    }
+    address
+}

@@ -1,0 +1,9 @@
+//! The experiments of the papers and the accuracy of the measurement.
+
+pub mod accuracy;
+pub mod barjuei2022;
+pub mod bcs_thesis;
+pub mod diagne2015;
+pub mod looey2026;
+pub mod ma2026;
+pub mod reproduce;

@@ -1,0 +1,144 @@
+//! How well widths are measured: figures of sets of pictures with their truth.
+
+pub mod calibration_table;
+pub mod calibrations;
+pub mod drawn;
+pub mod drawn_table;
+pub mod roughness_table;
+pub mod sets;
+pub mod studio;
+mod table;
+mod verdict;
+
+use serde::Serialize;
+
+use crate::numeric::statistics::Moments;
+use sets::{Limits, Set};
+
+pub use table::{markdown, table};
+pub use verdict::Miss;
+
+/// Error from which a width that was reported is silently wrong \[px\].
+const SILENT_PX: f64 = 0.5;
+/// Ends of the 95 % interval, in standard deviations.
+const INTERVAL: f64 = 1.96;
+
+/// Error and standard deviation of one measured width \[mm\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// Measured less true width.
+    pub error_mm: f64,
+    /// As the measurement believes it.
+    pub sigma_mm: f64,
+}
+
+/// The figures of one set. Without a measured frame most of them are none.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SetFigures {
+    /// The set's name.
+    pub set: &'static str,
+    /// Frames that were rendered.
+    pub frames: usize,
+    /// Mean error \[px\].
+    pub bias_px: Option<f64>,
+    /// Root of the mean square of the error \[px\].
+    pub rmse_px: Option<f64>,
+    /// Smallest standard deviation that is possible where the direction is
+    /// known \[px\].
+    pub bound_px: f64,
+    /// RMSE over that.
+    pub rmse_over_bound: Option<f64>,
+    /// Smallest standard deviation that is possible where the direction is
+    /// found from the same edges \[px\].
+    pub free_bound_px: f64,
+    /// RMSE over that.
+    pub rmse_over_free_bound: Option<f64>,
+    /// Mean error \[mm\].
+    pub bias_mm: Option<f64>,
+    /// Root of the mean square of the error \[mm\].
+    pub rmse_mm: Option<f64>,
+    /// Share of the frames that gave a width.
+    pub measured_share: f64,
+    /// Share of the frames that gave a width more than half a pixel off.
+    pub silent_share: f64,
+    /// Root of the mean square of the error over its standard deviation.
+    pub rms_over_sigma: Option<f64>,
+    /// Share of the widths whose 95 % interval holds the true one.
+    pub within_interval: Option<f64>,
+    /// Whether the set's limits are kept; none where it has none.
+    pub kept: Option<bool>,
+    /// What does not keep its limit.
+    pub missed: Vec<Miss>,
+}
+
+impl SetFigures {
+    /// Of a set with a pixel of `mm_per_px`; `None` stands for a frame that was
+    /// refused.
+    pub fn of(set: &Set, mm_per_px: f64, outcomes: &[Option<Outcome>]) -> Self {
+        let mut figures = Self::without_verdict(set, mm_per_px, outcomes);
+        figures.missed = verdict::misses(&set.limits, &figures);
+        figures.kept = (set.limits != Limits::default()).then_some(figures.missed.is_empty());
+        figures
+    }
+
+    fn without_verdict(set: &Set, mm_per_px: f64, outcomes: &[Option<Outcome>]) -> Self {
+        let (mut errors, mut ratios) = (Moments::default(), Moments::default());
+        let (mut silent, mut within) = (0_usize, 0_usize);
+        for outcome in outcomes.iter().flatten() {
+            let ratio = outcome.error_mm / outcome.sigma_mm;
+            errors.add(outcome.error_mm);
+            ratios.add(ratio);
+            silent += usize::from(outcome.error_mm.abs() > SILENT_PX * mm_per_px);
+            within += usize::from(ratio.abs() <= INTERVAL);
+        }
+        let (bias_mm, rmse_mm) = (errors.mean(), errors.rms());
+        let rmse_px = rmse_mm.map(|rmse| rmse / mm_per_px);
+        let (bound_px, free_bound_px) = (set.bound_px(), set.free_bound_px());
+        let measured = outcomes.iter().flatten().count();
+        Self {
+            set: set.name,
+            frames: outcomes.len(),
+            bias_px: bias_mm.map(|bias| bias / mm_per_px),
+            rmse_px,
+            bound_px,
+            rmse_over_bound: rmse_px.map(|rmse| rmse / bound_px),
+            free_bound_px,
+            rmse_over_free_bound: rmse_px.map(|rmse| rmse / free_bound_px),
+            bias_mm,
+            rmse_mm,
+            measured_share: share(measured, outcomes.len()),
+            silent_share: share(silent, outcomes.len()),
+            rms_over_sigma: ratios.rms(),
+            within_interval: (measured > 0).then(|| share(within, measured)),
+            kept: None,
+            missed: Vec::new(),
+        }
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "no set has 2^53 frames")]
+fn share(part: usize, of: usize) -> f64 {
+    part as f64 / of.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::sets;
+    use crate::studies::accuracy::*;
+
+    #[test]
+    fn figures_are_counted_over_the_frames_they_are_of() {
+        let set = sets::all().into_iter().find(|set| set.name == "tilted").unwrap();
+        let outcome = |error_mm| Some(Outcome { error_mm, sigma_mm: 0.01 });
+        let outcomes = [outcome(0.003), outcome(-0.005), outcome(0.062), None];
+        let figures = SetFigures::of(&set, 0.1, &outcomes);
+        assert!((figures.bias_px.unwrap() - 0.2).abs() < 1e-12);
+        let mean_square = (0.003_f64.powi(2) + 0.005_f64.powi(2) + 0.062_f64.powi(2)) / 3.0;
+        assert!((figures.rmse_mm.unwrap() - mean_square.sqrt()).abs() < 1e-12);
+        assert_eq!((figures.measured_share, figures.silent_share), (0.75, 0.25));
+        assert!((figures.within_interval.unwrap() - 2.0 / 3.0).abs() < 1e-12);
+        assert_eq!(figures.kept, Some(false));
+        let free = sets::Set { limits: Limits::default(), ..set };
+        assert_eq!(SetFigures::of(&free, 0.1, &outcomes).kept, None);
+    }
+}

@@ -1,0 +1,164 @@
+//! Whether calibrations know how good they are: figures of rigs with their truth.
+
+use serde::Serialize;
+
+use super::INTERVAL;
+use super::calibrations::{Outcome, Rig, Source};
+use super::table::{aligned, marked};
+
+/// How far scatter and forecast may be apart where trials are many.
+const APART: f64 = 0.10;
+/// Share of the true widths that the 95 % interval must hold.
+const HELD: (f64, f64) = (0.93, 0.97);
+/// Standard errors of a figure that are put down to the count of the trials.
+const STANDARD_ERRORS: f64 = 3.0;
+
+/// The figures of one rig.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RigFigures {
+    /// The rig's name.
+    pub rig: &'static str,
+    /// Where the corners came from.
+    pub source: &'static str,
+    /// Pictures of each calibration.
+    pub views: u64,
+    /// Standard deviation of a corner's place \[px\]; none for rendered pictures.
+    pub noise_px: Option<f64>,
+    /// Calibrations.
+    pub trials: usize,
+    /// Those that were found.
+    pub found: usize,
+    /// Root mean square error of a width over the trials, as a share of the width: the
+    /// smallest and the largest of the beads.
+    pub scatter_share: [f64; 2],
+    /// The same of the error over what its own calibration foretells: the smallest and
+    /// the largest of the beads.
+    pub ratio: [f64; 2],
+    /// The same over all beads together.
+    pub ratio_of_all: f64,
+    /// Share of the true widths that lie in the 95 % interval.
+    pub within_interval: f64,
+    /// Mean error over the standard deviation, of the bead where it is largest.
+    pub bias_over_sigma: f64,
+    /// Limits that are missed.
+    pub missed: Vec<String>,
+}
+
+struct OfBead {
+    scatter_share: f64,
+    ratio: f64,
+    bias_over_sigma: f64,
+}
+
+impl RigFigures {
+    /// Out of the widths of each trial.
+    #[expect(clippy::cast_precision_loss, reason = "counts of trials")]
+    pub fn of(rig: &Rig, source: Source, trials: &[Option<Vec<Outcome>>]) -> Self {
+        let found: Vec<&Vec<Outcome>> = trials.iter().flatten().collect();
+        let beads = found.first().map_or(0, |first| first.len());
+        let each: Vec<OfBead> = (0..beads).map(|bead| of_bead(&found, bead)).collect();
+        let all = || found.iter().flat_map(|outcomes| outcomes.iter());
+        let held = all().filter(|o| o.error_mm.abs() <= INTERVAL * o.sigma_mm).count() as f64;
+        let within_interval = held / all().count().max(1) as f64;
+        let ends = |value: fn(&OfBead) -> f64| {
+            let values = || each.iter().map(value);
+            [values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max)]
+        };
+        let squares: f64 = each.iter().map(|bead| bead.ratio.powi(2)).sum();
+        let mut figures = Self {
+            rig: rig.name,
+            source: match source {
+                Source::Corners => "corners",
+                Source::Pictures => "pictures",
+            },
+            views: rig.views,
+            noise_px: (source == Source::Corners).then_some(rig.noise_px),
+            trials: trials.len(),
+            found: found.len(),
+            scatter_share: ends(|bead| bead.scatter_share),
+            ratio: ends(|bead| bead.ratio),
+            ratio_of_all: (squares / each.len().max(1) as f64).sqrt(),
+            within_interval,
+            bias_over_sigma: ends(|bead| bead.bias_over_sigma.abs())[1],
+            missed: Vec::new(),
+        };
+        figures.missed = figures.misses();
+        figures
+    }
+
+    /// Few trials leave a figure open by itself: so much is granted.
+    #[expect(clippy::cast_precision_loss, reason = "counts of trials")]
+    fn misses(&self) -> Vec<String> {
+        let trials = self.found.max(1) as f64;
+        let open = APART.max(STANDARD_ERRORS / (2.0 * trials).sqrt());
+        let open_share = STANDARD_ERRORS * (0.95 * 0.05 / trials).sqrt();
+        let mut missed = Vec::new();
+        if self.found < self.trials {
+            missed.push(format!("{} trials without a calibration", self.trials - self.found));
+        }
+        if self.ratio[0] < 1.0 - open || self.ratio[1] > 1.0 + open {
+            missed.push(format!("scatter/foretold beyond {:.2} to {:.2}", 1.0 - open, 1.0 + open));
+        }
+        let (low, high) = (HELD.0.min(0.95 - open_share), HELD.1.max(0.95 + open_share));
+        if !(low..=high).contains(&self.within_interval) {
+            missed.push(format!("in 95 % beyond {:.1} to {:.1}", 100.0 * low, 100.0 * high));
+        }
+        missed
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "counts of trials")]
+fn of_bead(found: &[&Vec<Outcome>], bead: usize) -> OfBead {
+    let outcomes = || found.iter().filter_map(|outcomes| outcomes.get(bead));
+    let count = outcomes().count().max(1) as f64;
+    let mean = |value: fn(&Outcome) -> f64| outcomes().map(value).sum::<f64>() / count;
+    OfBead {
+        scatter_share: mean(|o| (o.error_mm / o.width_mm).powi(2)).sqrt(),
+        ratio: mean(|o| (o.error_mm / o.sigma_mm).powi(2)).sqrt(),
+        bias_over_sigma: mean(|o| o.error_mm / o.sigma_mm),
+    }
+}
+
+const COLUMNS: usize = 10;
+const HEADS: [&str; COLUMNS] = [
+    "camera",
+    "from",
+    "views",
+    "noise px",
+    "trials",
+    "scatter % of width",
+    "scatter/foretold",
+    "in 95 %",
+    "bias/σ",
+    "limits",
+];
+
+fn cells(figures: &RigFigures) -> [String; COLUMNS] {
+    let percent = figures.scatter_share.map(|share| 100.0 * share);
+    [
+        figures.rig.to_owned(),
+        figures.source.to_owned(),
+        figures.views.to_string(),
+        figures.noise_px.map_or_else(|| "–".to_owned(), |px| px.to_string()),
+        figures.found.to_string(),
+        format!("{:.4}–{:.4}", percent[0], percent[1]),
+        format!("{:.2}–{:.2}", figures.ratio[0], figures.ratio[1]),
+        format!("{:.1}", 100.0 * figures.within_interval),
+        format!("{:.2}", figures.bias_over_sigma),
+        if figures.missed.is_empty() {
+            "kept".to_owned()
+        } else {
+            format!("MISSED: {}", figures.missed.join("; "))
+        },
+    ]
+}
+
+/// The figures as a table for a terminal.
+pub fn table(figures: &[RigFigures]) -> String {
+    aligned(&HEADS, figures.iter().map(cells))
+}
+
+/// The figures as a table in Markdown.
+pub fn markdown(figures: &[RigFigures]) -> String {
+    marked(&HEADS, figures.iter().map(cells))
+}

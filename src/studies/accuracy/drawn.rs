@@ -1,0 +1,90 @@
+//! Frames whose every parameter is drawn at random, uniformly in its logarithm, from
+//! a range that is named: torn edges, holes, grooves, texture, ribs, motion, cameras
+//! with their faults. What the measurement was not tuned on.
+//!
+//! ```text
+//! list     the sets and what each must reach
+//! recipes  what is drawn from where
+//! draw     numbers of a frame, with a record of them
+//! scene    what a frame shows
+//! profile  edges that are random lines
+//! outline  where the borders lie on each line, and the area of the bead
+//! paint    light on the sensor: blur, motion, texture
+//! long_bead  a bead that passes through the gauge frame by frame
+//! camera   from light to grey levels: vignetting, gamma, noise, JPEG
+//! ```
+
+mod camera;
+mod draw;
+mod list;
+mod long_bead;
+mod outline;
+mod paint;
+mod profile;
+mod recipes;
+mod scene;
+
+use crate::core::frame::{Frame, Pixels, WrongSize};
+use crate::core::geometry::Roi;
+use crate::core::time::Stamp;
+use crate::core::units::Mm;
+use crate::vision::{Axis, Gauge, Polarity};
+use draw::Draw;
+use scene::Scene;
+
+pub use draw::Parameter;
+pub use list::{DrawnSet, Requirements, all, named};
+pub use long_bead::LongBead;
+
+/// Narrowest and widest bead that a gauge believes, in the bead's nominal widths.
+const RANGE: (f64, f64) = (0.6, 1.3);
+
+/// A frame and what is true of it. A pixel is a millimetre.
+#[derive(Debug, Clone)]
+pub struct DrawnFrame {
+    /// The picture.
+    pub frame: Frame,
+    /// The gauge that measures it: the whole picture.
+    pub gauge: Gauge,
+    /// Area of the unblurred bead over the gauge's length \[px\]. What is torn open to
+    /// the outside is no bead, a hole within it is.
+    pub truth_px: f64,
+    /// What was drawn.
+    pub parameters: Vec<Parameter>,
+}
+
+impl DrawnSet {
+    /// A frame of the set: the same for the same number.
+    pub fn take(&self, number: u64) -> Result<DrawnFrame, WrongSize> {
+        let mut draw = Draw::new(self.name, number);
+        let scene = (self.scene)(&mut draw);
+        let painted = paint::paint(&scene, &mut draw);
+        let pixels = camera::expose(&painted.light, &scene, &mut draw);
+        let frame = Frame::new(number, Stamp::START, scene.size, Pixels::Grey8(pixels))?;
+        let gauge = gauge(&scene, self.knows_gamma);
+        Ok(DrawnFrame { frame, gauge, truth_px: painted.truth_px, parameters: draw.record() })
+    }
+}
+
+fn gauge(scene: &Scene, knows_gamma: bool) -> Gauge {
+    let roi = Roi { x: 0, y: 0, width: scene.size.0, height: scene.size.1 };
+    let range = (Mm::constant(RANGE.0 * scene.width_px), Mm::constant(RANGE.1 * scene.width_px));
+    let gauge = Gauge::new(roi, Axis::Vertical, Polarity::Bright, range);
+    if knows_gamma { Gauge { gamma: Some(scene.gamma), ..gauge } } else { gauge }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::studies::accuracy::drawn::*;
+
+    #[test]
+    fn a_frame_depends_on_set_and_number_alone() {
+        for set in all() {
+            let (one, again, other) =
+                (set.take(3).unwrap(), set.take(3).unwrap(), set.take(4).unwrap());
+            assert_eq!(one.frame, again.frame, "{}", set.name);
+            assert_ne!(one.frame.pixels(), other.frame.pixels(), "{}", set.name);
+            assert!(!one.parameters.is_empty(), "{}", set.name);
+        }
+    }
+}

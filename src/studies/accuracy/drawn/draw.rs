@@ -1,0 +1,96 @@
+//! Numbers of a frame, with a record of those that a figure is split by.
+
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::Serialize;
+
+use crate::sim::hash;
+
+/// A number that was drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Parameter {
+    /// What it is, with its unit.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Ends of the range it was drawn from.
+    pub range: (f64, f64),
+}
+
+/// The random numbers of one frame.
+#[derive(Debug, Clone)]
+pub struct Draw {
+    random: Xoshiro256PlusPlus,
+    record: Vec<Parameter>,
+}
+
+impl Draw {
+    /// Those of a set's frame.
+    pub fn new(set: &str, frame: u64) -> Self {
+        let mut words: Vec<u64> = set.bytes().map(u64::from).collect();
+        words.push(frame);
+        let random = Xoshiro256PlusPlus::seed_from_u64(hash::mix(&words));
+        Self { random, record: Vec::new() }
+    }
+
+    /// Uniform in the logarithm, and kept in the record.
+    pub fn log(&mut self, name: &'static str, range: (f64, f64)) -> f64 {
+        let value = self.log_unnamed(range);
+        self.keep(name, value, range);
+        value
+    }
+
+    /// The same without record.
+    pub fn log_unnamed(&mut self, (from, to): (f64, f64)) -> f64 {
+        from * libm::exp(self.unit() * libm::log(to / from))
+    }
+
+    /// Keeps a number that follows from others in the record.
+    pub fn keep(&mut self, name: &'static str, value: f64, range: (f64, f64)) {
+        self.record.push(Parameter { name, value, range });
+    }
+
+    /// Uniform between two numbers.
+    pub fn between(&mut self, from: f64, to: f64) -> f64 {
+        from + (to - from) * self.unit()
+    }
+
+    /// True for one of so many frames.
+    pub fn one_of(&mut self, frames: f64) -> bool {
+        self.unit() * frames < 1.0
+    }
+
+    /// Standard normal.
+    pub fn normal(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.random)
+    }
+
+    /// A key for numbers that are drawn elsewhere.
+    pub fn key(&mut self) -> u64 {
+        StandardUniform.sample(&mut self.random)
+    }
+
+    /// What was drawn by name.
+    pub fn record(self) -> Vec<Parameter> {
+        self.record
+    }
+
+    fn unit(&mut self) -> f64 {
+        StandardUniform.sample(&mut self.random)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::studies::accuracy::drawn::draw::*;
+
+    #[test]
+    fn numbers_are_uniform_in_their_logarithm() {
+        let mut draw = Draw::new("test", 1);
+        let (n, range) = (10_000, (0.5, 8.0));
+        let below = (0..n).filter(|_| draw.log_unnamed(range) < 2.0).count();
+        // Half of them, with a standard deviation of 50.
+        assert!((4_800..5_200).contains(&below), "{below}");
+    }
+}

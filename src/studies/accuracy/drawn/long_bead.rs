@@ -1,0 +1,120 @@
+//! A long bead with torn edges that passes through the gauge frame by frame: what
+//! roughness over successive frames is judged by.
+
+use super::camera;
+use super::draw::Draw;
+use super::paint::{Painted, paint};
+use super::recipes;
+use super::scene::Scene;
+use crate::core::frame::{Frame, Pixels, WrongSize};
+use crate::core::time::Stamp;
+use crate::sim::hash;
+use crate::vision::Gauge;
+
+/// Name of its random numbers.
+const NAME: &str = "roughness";
+/// Edges of the bead that wave each for itself.
+const EDGES: f64 = 2.0;
+
+/// A bead of so many correlation lengths. A pixel is a millimetre.
+#[derive(Debug, Clone)]
+pub struct LongBead {
+    /// Of one frame.
+    scene: Scene,
+    painted: Painted,
+    rows: usize,
+    number: u64,
+}
+
+/// What the camera sees of it at one moment.
+#[derive(Debug, Clone)]
+pub struct Passage {
+    /// The picture.
+    pub frame: Frame,
+    /// Area of the unblurred bead over the gauge's length \[px\].
+    pub truth_px: f64,
+}
+
+impl LongBead {
+    /// Draws roughness and length as the set `torn` does, and paints the bead.
+    pub fn draw(number: u64, lengths: f64) -> Self {
+        let mut draw = Draw::new(NAME, number);
+        let scene = recipes::torn(&mut draw);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a few thousand rows"
+        )]
+        let rows = (lengths * scene.edges.length_px).ceil() as usize;
+        let rows = rows.max(scene.size.1);
+        let long = Scene { size: (scene.size.0, rows), ..scene.clone() };
+        let painted = paint(&long, &mut draw);
+        Self { scene, painted, rows, number }
+    }
+
+    /// Its gauge: the whole picture.
+    pub fn gauge(&self) -> Gauge {
+        super::gauge(&self.scene, false)
+    }
+
+    /// Length of the gauge \[px\].
+    pub fn gauge_rows(&self) -> usize {
+        self.scene.size.1
+    }
+
+    /// Length of the bead \[px\].
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// The bead's own mean width \[px\]: of no gauge, but of an endless bead.
+    pub fn own_width_px(&self) -> f64 {
+        self.painted.own_width_px()
+    }
+
+    /// Standard deviation of its local width \[px\].
+    pub fn roughness_px(&self) -> f64 {
+        EDGES.sqrt() * self.scene.edges.roughness_px
+    }
+
+    /// Correlation length of that \[px\].
+    pub fn length_px(&self) -> f64 {
+        self.scene.edges.length_px
+    }
+
+    /// Range that the correlation length was drawn from \[px\].
+    pub fn lengths_px() -> (f64, f64) {
+        recipes::LENGTH_PX
+    }
+
+    /// The frame whose gauge begins at a row; its noise is its own.
+    pub fn take(&self, frame: u64, first_row: usize) -> Result<Passage, WrongSize> {
+        let size = self.scene.size;
+        let first_row = first_row.min(self.rows - size.1);
+        let last_row = first_row + size.1;
+        let light = &self.painted.light[first_row * size.0..last_row * size.0];
+        let mut noise = Draw::new(NAME, hash::mix(&[self.number, frame]));
+        let pixels = camera::expose(light, &self.scene, &mut noise);
+        let frame = Frame::new(frame, Stamp::START, size, Pixels::Grey8(pixels))?;
+        Ok(Passage { frame, truth_px: self.painted.mean_width_px(first_row..last_row) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::studies::accuracy::drawn::long_bead::*;
+
+    #[test]
+    fn frames_of_one_bead_show_what_lies_within_their_rows() {
+        let bead = LongBead::draw(1, 50.0);
+        let (gauge, mut sum, mut gauges) = (bead.gauge_rows(), 0.0, 0_u32);
+        for first_row in (0..=bead.rows() - gauge).step_by(gauge) {
+            sum += bead.take(u64::from(gauges), first_row).unwrap().truth_px;
+            gauges += 1;
+        }
+        assert!(gauges > 1);
+        let whole = bead.painted.mean_width_px(0..bead.rows() / gauge * gauge);
+        assert!((sum / f64::from(gauges) - whole).abs() < 1e-9);
+        assert_ne!(bead.take(0, 0).unwrap().frame, bead.take(1, 0).unwrap().frame);
+    }
+}

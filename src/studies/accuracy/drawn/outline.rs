@@ -1,0 +1,231 @@
+//! Where the borders of a scene lie, line by line, and the area of its bead.
+
+use std::ops::Range;
+
+use super::draw::Draw;
+use super::profile::{height_of, rough};
+use super::scene::{Groove, Holes, Scene};
+
+/// Smallest width of a groove, as a fraction of its mean: its two rough sides do not
+/// cross.
+const MIN_GROOVE: f64 = 0.2;
+/// Largest standard deviation of a groove's width, as a fraction of its mean. The sides
+/// of a narrow groove follow each other.
+const MAX_GROOVE_SPREAD: f64 = 1.0 / 3.0;
+/// Distance of a hole from the deepest bay \[px\], so that no hole is open: more than
+/// six times the roughness of the edges.
+const HOLE_CLEARANCE_PX: f64 = 14.0;
+
+/// What begins at a place of a line and goes on to the next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Where it begins \[px\].
+    pub at_px: f64,
+    /// Its brightness \[grey levels\].
+    pub grey: f64,
+    /// Whether it is concrete, which carries the bead's texture.
+    pub concrete: bool,
+}
+
+/// A disc, from the picture's left and the first line \[px\].
+#[derive(Debug, Clone, Copy)]
+struct Disc {
+    x: f64,
+    y: f64,
+    radius: f64,
+}
+
+impl Disc {
+    /// Half of its chord at a height; none where it does not reach.
+    fn half_chord(&self, y_px: f64) -> Option<f64> {
+        let square = self.radius.powi(2) - (y_px - self.y).powi(2);
+        (square > 0.0).then(|| square.sqrt())
+    }
+}
+
+/// Where the scene's borders lie on every line, [`PER_PX`](super::profile::PER_PX) lines a pixel.
+#[derive(Debug, Clone)]
+pub struct Outline {
+    left: Vec<f64>,
+    right: Vec<f64>,
+    /// Far sides of the grooves.
+    far: [Option<Vec<f64>>; 2],
+    holes: Vec<Disc>,
+    axis_px: f64,
+    /// Width of the bead before its edges were torn \[px\].
+    pub width_px: f64,
+}
+
+/// The bead before its edges are torn \[px\].
+#[derive(Debug, Clone, Copy)]
+struct Straight {
+    axis: f64,
+    half: f64,
+}
+
+impl Outline {
+    /// Draws the borders of so many lines. Place and width of the bead differ from
+    /// frame to frame by up to a pixel.
+    pub fn draw(scene: &Scene, count: usize, draw: &mut Draw) -> Self {
+        #[expect(clippy::cast_precision_loss, reason = "pixels of a row")]
+        let middle = scene.size.0 as f64 / 2.0;
+        let bead = Straight {
+            axis: middle + draw.between(-scene.place_px, scene.place_px),
+            half: scene.width_px / 2.0 + draw.between(-0.5, 0.5),
+        };
+        let edges = scene.edges;
+        let torn = |draw: &mut Draw| rough(count, edges.roughness_px, edges.length_px, draw);
+        let (left, right) = (torn(draw), torn(draw));
+        let far_side = |groove: Option<Groove>, outwards: f64, near: &[f64], draw: &mut Draw| {
+            let groove = groove?;
+            let common = common_share(groove.width_px, edges.roughness_px);
+            let own = (1.0 - common * common).sqrt();
+            let gap = |(near, fresh): (&f64, f64)| {
+                let mean = groove.width_px + outwards * (common * near + own * fresh - near);
+                near + outwards * mean.max(MIN_GROOVE * groove.width_px)
+            };
+            let at_px = bead.axis + outwards * bead.half;
+            Some(near.iter().zip(torn(draw)).map(gap).map(|place| at_px + place).collect())
+        };
+        let [before, after] = scene.grooves;
+        let far = [far_side(before, -1.0, &left, draw), far_side(after, 1.0, &right, draw)];
+        let place = |at_px: f64, deviations: Vec<f64>| -> Vec<f64> {
+            deviations.into_iter().map(|deviation| at_px + deviation).collect()
+        };
+        let mut left = place(bead.axis - bead.half, left);
+        let mut right = place(bead.axis + bead.half, right);
+        let mut holes = Vec::new();
+        if let Some(dug) = &scene.holes {
+            cut_bays(dug, &mut left, (bead.axis - bead.half, 1.0), draw);
+            cut_bays(dug, &mut right, (bead.axis + bead.half, -1.0), draw);
+            holes = dig(dug, bead, count, draw);
+        }
+        Self { left, right, far, holes, axis_px: bead.axis, width_px: 2.0 * bead.half }
+    }
+
+    /// Area of the bead within some lines over their length \[px\].
+    pub fn mean_width(&self, lines: Range<usize>) -> f64 {
+        let count = lines.len().max(1);
+        let widths = self.left[lines.clone()].iter().zip(&self.right[lines]);
+        #[expect(clippy::cast_precision_loss, reason = "a few thousand lines")]
+        let mean = widths.map(|(left, right)| right - left).sum::<f64>() / count as f64;
+        mean
+    }
+
+    /// What lies along a line, from left to right; the first begins beyond the
+    /// picture.
+    pub fn steps(&self, scene: &Scene, line: usize) -> Vec<Step> {
+        let (left, right) = (self.left[line], self.right[line]);
+        let step = |at_px: f64, grey: f64, concrete: bool| Step { at_px, grey, concrete };
+        let beyond = |side: usize, at_px: f64| match scene.grooves[side] {
+            Some(groove) if groove.neighbour => step(at_px, scene.bead_grey, true),
+            _ => step(at_px, scene.ground_grey, false),
+        };
+        let mut steps = vec![beyond(0, f64::NEG_INFINITY)];
+        if let (Some(groove), Some(far)) = (scene.grooves[0], &self.far[0]) {
+            steps.push(step(far[line], groove.grey, false));
+        }
+        steps.push(step(left, scene.bead_grey, true));
+        for rib in &scene.ribs {
+            let from = self.axis_px + rib.at_px - rib.width_px / 2.0;
+            steps.push(step(from, scene.bead_grey + rib.over_grey, true));
+            steps.push(step(from + rib.width_px, scene.bead_grey, true));
+        }
+        if let Some(dug) = scene.holes {
+            for (from, to) in self.chords(height_of(line)) {
+                steps.push(step(from, dug.grey, false));
+                steps.push(step(to, scene.bead_grey, true));
+            }
+        }
+        match (scene.grooves[1], &self.far[1]) {
+            (Some(groove), Some(far)) => {
+                steps.push(step(right, groove.grey, false));
+                steps.push(beyond(1, far[line]));
+            }
+            _ => steps.push(beyond(1, right)),
+        }
+        steps
+    }
+
+    /// From where to where a line runs through holes, from left to right.
+    fn chords(&self, y_px: f64) -> Vec<(f64, f64)> {
+        let chord = |hole: &Disc| {
+            let half = hole.half_chord(y_px)?;
+            Some((hole.x - half, hole.x + half))
+        };
+        let mut chords: Vec<(f64, f64)> = self.holes.iter().filter_map(chord).collect();
+        chords.sort_by(|one, other| one.0.total_cmp(&other.0));
+        let mut apart: Vec<(f64, f64)> = Vec::new();
+        for (from, to) in chords {
+            match apart.last_mut() {
+                Some(last) if from <= last.1 => last.1 = last.1.max(to),
+                _ => apart.push((from, to)),
+            }
+        }
+        apart
+    }
+}
+
+/// How much of a groove's far side repeats its near side, so that its width spreads as
+/// much as it may: two sides of the roughness r with the correlation c differ by
+/// r·√(2 − 2c).
+fn common_share(width_px: f64, roughness_px: f64) -> f64 {
+    let spread = MAX_GROOVE_SPREAD * width_px / roughness_px.max(f64::MIN_POSITIVE);
+    (1.0 - 0.5 * spread * spread).max(0.0)
+}
+
+/// Cuts bays out of an edge that lies at a place, towards +1 or −1.
+fn cut_bays(dug: &Holes, edge: &mut [f64], (at_px, inwards): (f64, f64), draw: &mut Draw) {
+    let height = height_of(edge.len());
+    for _ in 0..dug.count {
+        let bay = Disc { x: at_px, y: draw.between(0.0, height), radius: dug.size_px / 2.0 };
+        for (line, at) in edge.iter_mut().enumerate() {
+            if let Some(half_chord) = bay.half_chord(height_of(line)) {
+                let end = bay.x + inwards * half_chord;
+                *at = if inwards > 0.0 { at.max(end) } else { at.min(end) };
+            }
+        }
+    }
+}
+
+/// Twice as many closed holes as an edge has bays.
+fn dig(dug: &Holes, bead: Straight, lines: usize, draw: &mut Draw) -> Vec<Disc> {
+    let height = height_of(lines);
+    let room = bead.half - dug.size_px - HOLE_CLEARANCE_PX;
+    let disc = |_| Disc {
+        x: bead.axis + draw.between(-room, room),
+        y: draw.between(0.0, height),
+        radius: dug.size_px / 2.0,
+    };
+    (0..2 * dug.count).map(disc).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::studies::accuracy::drawn::outline::*;
+    use crate::studies::accuracy::drawn::profile::PER_PX;
+    use crate::studies::accuracy::drawn::scene::Tear;
+
+    #[test]
+    fn grooves_are_as_wide_as_asked_for_and_rough_on_both_sides() {
+        for width_px in [2.0, 10.0, 40.0] {
+            let groove = Groove { width_px, grey: 10.0, neighbour: true };
+            let edges = Tear { roughness_px: 3.0, length_px: 8.0 };
+            let scene = Scene { grooves: [Some(groove); 2], edges, ..Scene::default() };
+            let count = 20_000 * PER_PX;
+            let outline = Outline::draw(&scene, count, &mut Draw::new("groove", 1));
+            let far = outline.far[1].as_ref().unwrap();
+            let gaps: Vec<f64> =
+                far.iter().zip(&outline.right).map(|(far, near)| far - near).collect();
+            let mean = |values: &[f64]| {
+                values.iter().sum::<f64>() / f64::from(u32::try_from(values.len()).unwrap())
+            };
+            assert!((mean(&gaps) / width_px - 1.0).abs() < 0.03, "{width_px}: {}", mean(&gaps));
+            assert!(gaps.iter().all(|gap| *gap > 0.19 * width_px));
+            let middle = mean(far);
+            let squares: Vec<f64> = far.iter().map(|far| (far - middle).powi(2)).collect();
+            // 20,000 px with a correlation length of 8 px hold 1,250 independent places.
+            assert!((mean(&squares) / 9.0 - 1.0).abs() < 0.15, "{}", mean(&squares));
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! The light of a scene on the sensor. Across the bead each border is the exact
+//! integral of its blurred, moved step over the pixel. Sampling what pixels cover and
+//! blurring that would move an edge by 0.02 px with its place within a pixel at a blur
+//! of 0.5 px, more than noise does.
+
+use std::ops::Range;
+
+use super::draw::Draw;
+use super::outline::{Outline, Step};
+use super::profile::PER_PX;
+use super::scene::Scene;
+use crate::scenario::image::Texture;
+use crate::sim::convolve::{convolve_lines, kernel};
+use crate::sim::edge::coverage;
+use crate::sim::texture::texture;
+
+/// Blurs beyond which a step is taken for complete: Φ(−5) is 3·10⁻⁷.
+const REACH_BLURS: f64 = 5.0;
+/// Places of the table of a step in a pixel; linear between them, it is exact to 10⁻⁴.
+const PLACES: f64 = 64.0;
+
+/// A painted scene.
+#[derive(Debug, Clone)]
+pub struct Painted {
+    /// Light of the picture's pixels, row by row \[grey levels of a camera with gamma
+    /// 1\].
+    pub light: Vec<f32>,
+    /// Area of the unblurred bead over the picture's height \[px\].
+    pub truth_px: f64,
+    /// Where its borders lie, and the picture's first line of it.
+    outline: Outline,
+    first_line: usize,
+}
+
+impl Painted {
+    /// Area of the unblurred bead within some rows over their height \[px\].
+    pub fn mean_width_px(&self, rows: Range<usize>) -> f64 {
+        let line = |row: usize| self.first_line + row * PER_PX;
+        self.outline.mean_width(line(rows.start)..line(rows.end))
+    }
+
+    /// Width of the bead before its edges were torn \[px\].
+    pub fn own_width_px(&self) -> f64 {
+        self.outline.width_px
+    }
+}
+
+/// Paints a scene. A texture is that of the picture: the blur does not weaken it.
+pub fn paint(scene: &Scene, draw: &mut Draw) -> Painted {
+    let (width, height) = scene.size;
+    let blur = kernel(scene.blur_px);
+    // The blur reaches beyond the first and the last row.
+    let margin = blur.len();
+    let rows = height + 2 * margin;
+    let outline = Outline::draw(scene, rows * PER_PX, draw);
+    let edge = StepTable::new(scene.blur_px, scene.motion_px);
+    let within = |values: &[f32]| values[margin * width..(margin + height) * width].to_vec();
+    let layer = |value: &dyn Fn(&Step) -> f64| {
+        let mut values = vec![0.0; width * rows];
+        for (row, values) in values.chunks_exact_mut(width).enumerate() {
+            let lines = row * PER_PX..(row + 1) * PER_PX;
+            edge.fill(values, lines.map(|line| outline.steps(scene, line)), value);
+        }
+        convolve_lines(&mut values, width, &blur);
+        within(&values)
+    };
+    let mut light = layer(&|step| step.grey);
+    let textures = [scene.texture, scene.ground_texture];
+    if textures.iter().any(|patches| patches.size_grey > 0.0) {
+        let concrete = layer(&|step| f64::from(u8::from(step.concrete)));
+        for (patches, on_concrete) in textures.into_iter().zip([true, false]) {
+            let asked = Texture { size_grey: patches.size_grey, length_px: patches.length_px };
+            let Some(pattern) = texture(&asked, scene.size, draw.key()) else { continue };
+            for ((light, share), value) in light.iter_mut().zip(&concrete).zip(pattern) {
+                *light += value * if on_concrete { *share } else { 1.0 - share };
+            }
+        }
+    }
+    let first_line = margin * PER_PX;
+    let truth_px = outline.mean_width(first_line..(margin + height) * PER_PX);
+    Painted { light, truth_px, outline, first_line }
+}
+
+/// A unit step as pixels see it, by the distance of their centres from it.
+struct StepTable {
+    reach_px: f64,
+    values: Vec<f64>,
+}
+
+impl StepTable {
+    /// Of a blur and a motion across the step \[px\].
+    fn new(blur_px: f64, motion_px: f64) -> Self {
+        let reach_px = REACH_BLURS * blur_px + 0.5 * (1.0 + motion_px);
+        let value = |place: u32| {
+            let inside = f64::from(place) / PLACES - reach_px;
+            // The mean over the pixel and over the motion: two sides of one box.
+            coverage(inside, [1.0, motion_px], blur_px)
+        };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small")]
+        let last = (2.0 * reach_px * PLACES).ceil() as u32;
+        Self { reach_px, values: (0..=last).map(value).collect() }
+    }
+
+    /// The step so far inside it, within the table's reach.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "a place within the table"
+    )]
+    fn at(&self, inside_px: f64) -> f64 {
+        let place = ((inside_px + self.reach_px) * PLACES).max(0.0);
+        let below = place as usize;
+        match self.values.get(below..below + 2) {
+            Some(ends) => ends[0] + (place - below as f64) * (ends[1] - ends[0]),
+            None => 1.0,
+        }
+    }
+
+    /// Fills a row of pixels with the mean of its lines.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "pixels of a row; saturating at its ends is meant"
+    )]
+    fn fill(
+        &self,
+        row: &mut [f32],
+        lines: impl Iterator<Item = Vec<Step>>,
+        value: &dyn Fn(&Step) -> f64,
+    ) {
+        let share = 1.0 / PER_PX as f64;
+        let mut flanks = vec![0.0; row.len()];
+        // What is complete from a pixel on.
+        let mut complete = vec![0.0; row.len() + 1];
+        for steps in lines {
+            complete[0] += share * steps.first().map_or(0.0, value);
+            for pair in steps.windows(2) {
+                let height = share * (value(&pair[1]) - value(&pair[0]));
+                let at = pair[1].at_px - 0.5;
+                let from = ((at - self.reach_px).ceil().max(0.0) as usize).min(row.len());
+                let to = ((at + self.reach_px).floor().max(-1.0) + 1.0) as usize;
+                let to = to.clamp(from, row.len());
+                for (pixel, flank) in flanks.iter_mut().enumerate().take(to).skip(from) {
+                    *flank += height * self.at(pixel as f64 - at);
+                }
+                complete[to] += height;
+            }
+        }
+        let mut level = 0.0;
+        for ((pixel, flank), step) in row.iter_mut().zip(flanks).zip(complete) {
+            level += step;
+            *pixel = (level + flank) as f32;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,45 @@
+//! An edge as a random line: a stationary Gauss–Markov process.
+
+use super::draw::Draw;
+
+/// Places of a profile in a pixel.
+pub const PER_PX: usize = 4;
+
+/// Where a place of a profile lies \[px\], from the profile's end.
+#[expect(clippy::cast_precision_loss, reason = "a few thousand places")]
+pub fn height_of(place: usize) -> f64 {
+    (place as f64 + 0.5) / PER_PX as f64
+}
+
+/// Deviations of an edge \[px\], [`PER_PX`] a pixel: of the standard deviation
+/// `roughness_px`, with the autocorrelation exp(−|d|/`length_px`).
+pub fn rough(count: usize, roughness_px: f64, length_px: f64, draw: &mut Draw) -> Vec<f64> {
+    if roughness_px <= 0.0 {
+        return vec![0.0; count];
+    }
+    #[expect(clippy::cast_precision_loss, reason = "small")]
+    let keep = libm::exp(-1.0 / (length_px * PER_PX as f64));
+    let fresh = (1.0 - keep * keep).sqrt();
+    let mut last = draw.normal();
+    let deviations = (0..count).map(|_| {
+        last = keep * last + fresh * draw.normal();
+        roughness_px * last
+    });
+    deviations.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::studies::accuracy::drawn::profile::*;
+
+    #[test]
+    fn roughness_and_length_are_those_asked_for() {
+        let count = 400_000;
+        let line = rough(count, 2.0, 5.0, &mut Draw::new("test", 2));
+        let covariance =
+            |lag: usize| line.iter().zip(&line[lag..]).map(|(a, b)| a * b).sum::<f64>() / 400_000.0;
+        // 100,000 px with a correlation length of 5 px hold 10,000 independent places.
+        assert!((covariance(0) / 4.0 - 1.0).abs() < 0.06, "{}", covariance(0));
+        assert!((covariance(20) / 4.0 - libm::exp(-1.0)).abs() < 0.06, "{}", covariance(20));
+    }
+}

@@ -1,0 +1,258 @@
+//! Figures of roughness over successive frames.
+
+use serde::Serialize;
+
+use super::share;
+use super::table::{aligned, marked};
+use crate::numeric::statistics::Moments;
+
+/// Largest median error of roughness and of its correlation length, relative.
+const MAX_ROUGHNESS_ERROR: f64 = 0.20;
+const MAX_LENGTH_ERROR: f64 = 0.30;
+/// Smallest and largest root of the mean square of a width's error against the bead's own
+/// mean, over sigma with roughness.
+const Z: (f64, f64) = (0.85, 1.15);
+/// Parts of the range of correlation lengths.
+const PARTS: [&str; 3] = ["short waves", "middle waves", "long waves"];
+
+/// What came of one bead.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BeadOutcome {
+    /// True correlation length \[px\].
+    pub length_px: f64,
+    /// What frames found; none where they left it open.
+    pub found: Option<Found>,
+    /// Each measured frame's error against the bead's own mean \[px\].
+    pub widths: Vec<OwnMeanError>,
+}
+
+/// What successive frames found, over what is true.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found {
+    /// Roughness.
+    pub roughness: Ratio,
+    /// Correlation length.
+    pub length: Ratio,
+    /// Standard deviation of a gauge's mean about the bead's own mean \[px\].
+    pub of_gauge_mean_px: f64,
+}
+
+/// An estimate over its truth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ratio {
+    /// Found over true.
+    pub value: f64,
+    /// Its standard deviation over the found value.
+    pub sigma: f64,
+}
+
+/// How far a frame's width is off the bead's own mean \[px\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OwnMeanError {
+    /// Measured less own mean.
+    pub error_px: f64,
+    /// As the measurement reports it, without roughness.
+    pub sigma_px: f64,
+}
+
+/// Figures of some beads.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RoughnessFigures {
+    /// How far the bead moves on from frame to frame \[px\].
+    pub advance_px: usize,
+    /// Which of the beads.
+    pub part: &'static str,
+    /// Their number.
+    pub beads: usize,
+    /// Share whose roughness was determined.
+    pub determined_share: f64,
+    /// Median of found over true roughness.
+    pub roughness_median: Option<f64>,
+    /// Median of |found/true − 1|; a bead without an estimate counts as 1.
+    pub roughness_error: Option<f64>,
+    /// Root of the mean square of the error of its logarithm over its sigma.
+    pub roughness_z: Option<f64>,
+    /// The same of the correlation length.
+    pub length_median: Option<f64>,
+    /// See [`Self::roughness_error`].
+    pub length_error: Option<f64>,
+    /// See [`Self::roughness_z`].
+    pub length_z: Option<f64>,
+    /// Measured frames of the determined beads.
+    pub frames: u64,
+    /// Root of the mean square of a width's error against the bead's own mean over sigma
+    /// with roughness.
+    pub width_z: Option<f64>,
+    /// The same over sigma alone.
+    pub width_z_alone: Option<f64>,
+    /// What is missed.
+    pub missed: Vec<String>,
+}
+
+/// Figures over all beads and within each third, in the logarithm, of the range of
+/// correlation lengths \[px\]; limits are those of all.
+pub fn figures(
+    advance_px: usize,
+    outcomes: &[BeadOutcome],
+    (from, to): (f64, f64),
+) -> Vec<RoughnessFigures> {
+    let every: Vec<&BeadOutcome> = outcomes.iter().collect();
+    let mut all = RoughnessFigures::of(advance_px, "all", &every);
+    all.missed = all.misses();
+    let mut parts = vec![all];
+    for (number, part) in (0u32..).zip(PARTS) {
+        let end = |number: u32| from * libm::pow(to / from, f64::from(number) / 3.0);
+        let within = end(number)..end(number + 1);
+        let some: Vec<&BeadOutcome> =
+            outcomes.iter().filter(|outcome| within.contains(&outcome.length_px)).collect();
+        parts.push(RoughnessFigures::of(advance_px, part, &some));
+    }
+    parts
+}
+
+impl RoughnessFigures {
+    fn of(advance_px: usize, part: &'static str, outcomes: &[&BeadOutcome]) -> Self {
+        let (mut widths, mut alone) = (Moments::default(), Moments::default());
+        for outcome in outcomes {
+            let Some(found) = outcome.found else { continue };
+            for width in &outcome.widths {
+                widths.add(width.error_px / width.sigma_px.hypot(found.of_gauge_mean_px));
+                alone.add(width.error_px / width.sigma_px);
+            }
+        }
+        let of = |ratio: fn(&Found) -> Ratio| {
+            let found = |outcome: &&BeadOutcome| outcome.found.as_ref().map(ratio);
+            let errors = outcomes
+                .iter()
+                .map(|outcome| found(outcome).map_or(1.0, |ratio| (ratio.value - 1.0).abs()));
+            let found: Vec<Ratio> = outcomes.iter().filter_map(found).collect();
+            let mut z = Moments::default();
+            for ratio in &found {
+                z.add(ratio.value.ln() / ratio.sigma);
+            }
+            (median(found.iter().map(|ratio| ratio.value)), median(errors), z.rms())
+        };
+        let (roughness_median, roughness_error, roughness_z) = of(|found| found.roughness);
+        let (length_median, length_error, length_z) = of(|found| found.length);
+        let determined = outcomes.iter().filter(|outcome| outcome.found.is_some()).count();
+        Self {
+            advance_px,
+            part,
+            beads: outcomes.len(),
+            determined_share: share(determined, outcomes.len()),
+            roughness_median,
+            roughness_error,
+            roughness_z,
+            length_median,
+            length_error,
+            length_z,
+            frames: widths.count(),
+            width_z: widths.rms(),
+            width_z_alone: alone.rms(),
+            missed: Vec::new(),
+        }
+    }
+
+    fn misses(&self) -> Vec<String> {
+        let errors = [
+            ("roughness", self.roughness_error, MAX_ROUGHNESS_ERROR),
+            ("length", self.length_error, MAX_LENGTH_ERROR),
+        ];
+        let missed = errors.into_iter().filter_map(|(name, error, most)| {
+            let error = error.filter(|error| *error > most)?;
+            Some(format!("median error of {name} {error:.2} > {most}"))
+        });
+        let of_width = self.width_z.filter(|z| !(Z.0..=Z.1).contains(z));
+        let of_width = of_width.map(|z| format!("z {z:.2}, not {} to {}", Z.0, Z.1));
+        missed.chain(of_width).collect()
+    }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+const COLUMNS: usize = 14;
+const HEADS: [&str; COLUMNS] = [
+    "part",
+    "moves on px",
+    "beads",
+    "determined %",
+    "roughness found/true",
+    "median error %",
+    "z",
+    "length found/true",
+    "median error %",
+    "z",
+    "frames",
+    "z of widths",
+    "without roughness",
+    "limits",
+];
+
+fn cells(figures: &RoughnessFigures) -> [String; COLUMNS] {
+    let number = |value: Option<f64>, digits: usize| {
+        value.map_or("–".to_owned(), |value| format!("{value:.digits$}"))
+    };
+    let percent = |value: Option<f64>| number(value.map(|value| 100.0 * value), 1);
+    [
+        figures.part.to_owned(),
+        figures.advance_px.to_string(),
+        figures.beads.to_string(),
+        percent(Some(figures.determined_share)),
+        number(figures.roughness_median, 2),
+        percent(figures.roughness_error),
+        number(figures.roughness_z, 2),
+        number(figures.length_median, 2),
+        percent(figures.length_error),
+        number(figures.length_z, 2),
+        figures.frames.to_string(),
+        number(figures.width_z, 2),
+        number(figures.width_z_alone, 1),
+        match figures.missed.as_slice() {
+            [] if figures.part == "all" => "kept".to_owned(),
+            [] => "–".to_owned(),
+            missed => format!("MISSED: {}", missed.join("; ")),
+        },
+    ]
+}
+
+/// The figures as a table for a terminal.
+pub fn table(figures: &[RoughnessFigures]) -> String {
+    aligned(&HEADS, figures.iter().map(cells))
+}
+
+/// The figures as a table in Markdown.
+pub fn markdown(figures: &[RoughnessFigures]) -> String {
+    marked(&HEADS, figures.iter().map(cells))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::studies::accuracy::roughness_table::*;
+
+    #[test]
+    fn limits_are_those_of_medians_and_of_widths_against_the_own_mean() {
+        let ratio = |value: f64| Ratio { value, sigma: 0.1 };
+        let bead = |value: f64, error_px: f64| BeadOutcome {
+            length_px: 10.0,
+            found: Some(Found {
+                roughness: ratio(value),
+                length: ratio(1.0),
+                of_gauge_mean_px: 0.4,
+            }),
+            widths: vec![OwnMeanError { error_px, sigma_px: 0.3 }; 2],
+        };
+        let of = |beads: &[BeadOutcome]| figures(10, beads, (3.0, 40.0))[0].missed.join(";");
+        let good = [bead(0.9, 0.5), bead(1.1, -0.5), bead(1.0, 0.5)];
+        assert_eq!(of(&good), "");
+        let rough = [bead(1.3, 0.5), bead(1.4, -0.5), bead(1.0, 0.5)];
+        assert_eq!(of(&rough), "median error of roughness 0.30 > 0.2");
+        let far = [bead(1.0, 0.6), bead(1.0, -0.6), bead(1.0, 0.6)];
+        assert_eq!(of(&far), "z 1.20, not 0.85 to 1.15");
+        let open = BeadOutcome { found: None, ..bead(1.0, 0.5) };
+        assert!(of(&[open.clone(), open, bead(1.0, 0.5)]).contains("length 1.00 > 0.3"));
+    }
+}

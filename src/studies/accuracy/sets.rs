@@ -1,0 +1,171 @@
+//! Named sets of pictures whose truth is known: what the measurement is judged
+//! by.
+
+mod limits;
+mod list;
+
+use crate::core::geometry::Roi;
+use crate::core::units::Mm;
+use crate::scenario::bead::Roughness;
+use crate::scenario::image::Picture;
+use crate::vision::{Axis, Gauge, Polarity};
+
+pub use limits::Limits;
+pub use list::all;
+
+/// Scale of all sets without a camera model, that of the 2022 paper.
+pub const MM_PER_PX: f64 = 0.126_582;
+/// The gauge's extent across the bead, and that of the picture \[px\].
+const ACROSS: (usize, u32) = (640, 720);
+
+/// Pictures of one kind.
+#[derive(Debug, Clone)]
+pub struct Set {
+    /// What it is called.
+    pub name: &'static str,
+    /// How the bead is pictured; the size is that of the set.
+    pub picture: Picture,
+    /// Rows of the gauge; of a horizontal bead columns.
+    pub rows: u32,
+    /// Width of the bead in the mean \[mm\].
+    pub width_mm: f64,
+    /// Roughness of its edges.
+    pub roughness: Roughness,
+    /// How it runs in the picture.
+    pub axis: Axis,
+    /// The bead against its surroundings.
+    pub polarity: Polarity,
+    /// Seen by a tilted camera through a lens with distortion.
+    pub tilted: bool,
+    /// What the measurement must reach.
+    pub limits: Limits,
+}
+
+impl Set {
+    /// Smallest standard deviation that the width of a straight bead can have
+    /// \[px\] where its direction is known.
+    ///
+    /// A line across a step of the height A that is blurred with s, in white
+    /// noise σ, tells the step's place with a variance of at least
+    /// 2√π·(σ/A)²·s (Cramér–Rao), whether or not blur and height of the step are
+    /// known, whose effects are odd about its place. (A level that both sides
+    /// share is even like the place and costs a little more, the less the
+    /// more pixels there are beside the edge.) Along a row that cuts
+    /// the edge at the slant t the blur is s/cos t, and what is found along the
+    /// row is cos t as long normal to the edge. From N rows and two edges:
+    ///
+    /// ```text
+    /// var = 2·cos² t·e²/N,   e² = 2√π·(σ/A)²·s/cos t
+    /// ```
+    pub fn bound_px(&self) -> f64 {
+        let cos = libm::cos(self.picture.slant_deg.to_radians());
+        (2.0 * cos * cos * self.row_variance() / f64::from(self.rows)).sqrt()
+    }
+
+    /// The same where the direction has to be found from the same edges.
+    ///
+    /// The width is w = c·cos t with the chord c along a row. Two parallel
+    /// edges x = a + m·v, m = tan t, over the same N rows v give a, and with it
+    /// c, independently of m, and m with the variance e²/(2·Σv²) = 6·e²/N³ for
+    /// v counted from the middle. With dt = cos² t·dm and
+    /// dw = −c·sin t·dt = −w·tan t·dt:
+    ///
+    /// ```text
+    /// var = 2·cos² t·e²/N + (w·tan t)²·cos⁴ t·6·e²/N³
+    /// ```
+    ///
+    /// That is 1 + 3·(w·sin t/N)² times the variance with a known direction, and
+    /// the same for a bead along the gauge.
+    pub fn free_bound_px(&self) -> f64 {
+        let (sin, cos) = libm::sincos(self.picture.slant_deg.to_radians());
+        let rows = f64::from(self.rows);
+        let lever = self.width_mm / MM_PER_PX * sin / cos;
+        let direction = cos.powi(4) * 6.0 * self.row_variance() / rows.powi(3);
+        (self.bound_px().powi(2) + lever * lever * direction).sqrt()
+    }
+
+    /// Smallest variance of an edge's place along a row e² \[px²\].
+    fn row_variance(&self) -> f64 {
+        let Picture { bead_grey, ground_grey, noise_grey, blur_px, slant_deg, .. } = self.picture;
+        let share = noise_grey / (bead_grey - ground_grey);
+        let along_row = blur_px / libm::cos(slant_deg.to_radians());
+        2.0 * std::f64::consts::PI.sqrt() * share * share * along_row
+    }
+
+    /// Whether silently wrong widths are limited, for which many frames are
+    /// needed.
+    pub fn limits_silent(&self) -> bool {
+        self.limits.silent_share.is_some()
+    }
+
+    /// Size of the pictures \[px\], where no camera model sets it.
+    pub fn size_px(&self) -> [u32; 2] {
+        match self.axis {
+            Axis::Vertical => [ACROSS.1, self.rows + 20],
+            Axis::Horizontal => [self.rows + 20, ACROSS.1],
+        }
+    }
+
+    /// The gauge of a cell with defaults.
+    pub fn gauge(&self) -> Gauge {
+        let rows = usize::try_from(self.rows).unwrap_or(usize::MAX);
+        let first = if self.tilted { 20 } else { 10 };
+        let roi = match self.axis {
+            Axis::Vertical => Roi { x: 40, y: first, width: ACROSS.0, height: rows },
+            Axis::Horizontal => Roi { x: first, y: 40, width: rows, height: ACROSS.0 },
+        };
+        let range = if self.width_mm < 20.0 { [5.0, 25.0] } else { [20.0, 60.0] };
+        Gauge::new(roi, self.axis, self.polarity, (Mm::constant(range[0]), Mm::constant(range[1])))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::studies::accuracy::sets::*;
+    use std::collections::BTreeSet;
+
+    fn set(name: &str) -> Set {
+        all().into_iter().find(|set| set.name == name).unwrap()
+    }
+
+    #[test]
+    fn every_set_has_a_name_and_limits_of_its_own() {
+        let sets = all();
+        let names: BTreeSet<&str> = sets.iter().map(|set| set.name).collect();
+        assert_eq!(names.len(), sets.len());
+        assert!(sets.iter().all(|set| set.limits != Limits::default()));
+    }
+
+    #[test]
+    fn the_bound_of_a_plain_set_is_that_of_two_edges() {
+        for name in ["blur-1.5", "horizontal", "dark-bead"] {
+            let bound = set(name).bound_px();
+            assert!(
+                (bound / (1.8827 * 0.05 * 1.5_f64.sqrt() * 0.02_f64.sqrt()) - 1.0).abs() < 1e-4
+            );
+            assert_eq!(set(name).free_bound_px(), bound);
+        }
+    }
+
+    /// Against the information matrix of both edges' places and the common
+    /// slope, row by row.
+    #[test]
+    fn the_bound_for_an_unknown_direction_is_that_of_a_straight_fit() {
+        let set = set("slant-15-blur-1.5");
+        let (sin, cos) = 15_f64.to_radians().sin_cos();
+        let variance = 1.8827_f64.powi(2) * 0.05_f64.powi(2) * 1.5 / cos;
+        let mut information = nalgebra::Matrix3::<f64>::zeros();
+        for row in 0..100 {
+            let v = f64::from(row) - 20.0;
+            for edge in [nalgebra::Vector3::new(1.0, 0.0, v), nalgebra::Vector3::new(0.0, 1.0, v)] {
+                information += edge * edge.transpose() / variance;
+            }
+        }
+        let chord = set.width_mm / MM_PER_PX / cos;
+        // Of (right − left)·cos(atan m) by left, right and m.
+        let by = nalgebra::Vector3::new(-cos, cos, -chord * sin * cos * cos);
+        let bound = (by.transpose() * information.try_inverse().unwrap() * by)[0].sqrt();
+        assert!((set.free_bound_px() / bound - 1.0).abs() < 1e-3, "{bound}");
+        assert!(set.free_bound_px() > 1.05 * set.bound_px());
+    }
+}

@@ -1,0 +1,151 @@
+//! Figures held against the limits of their set.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::SetFigures;
+use super::sets::Limits;
+
+/// A figure that does not keep its limit, as the table shows it: shares are in
+/// percent.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Miss {
+    /// Which figure.
+    pub figure: &'static str,
+    /// What it is; none where nothing was measured.
+    pub value: Option<f64>,
+    /// What it was to be, at least or at most.
+    pub limit: f64,
+}
+
+impl fmt::Display for Miss {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.value {
+            None => write!(f, "{} none", self.figure),
+            Some(value) => {
+                let sign = if value < self.limit { '<' } else { '>' };
+                write!(f, "{} {} {sign} {}", self.figure, short(value), short(self.limit))
+            }
+        }
+    }
+}
+
+/// With four digits that count.
+fn short(value: f64) -> f64 {
+    if value == 0.0 {
+        return value;
+    }
+    let scale = 10_f64.powf(3.0 - value.abs().log10().floor());
+    (value * scale).round() / scale
+}
+
+/// A figure and what it must keep to.
+#[derive(Clone, Copy)]
+struct Check {
+    figure: &'static str,
+    /// 100 for shares that are shown in percent.
+    scale: f64,
+    value: Option<f64>,
+    least: Option<f64>,
+    most: Option<f64>,
+}
+
+impl Check {
+    fn miss(self) -> Option<Miss> {
+        let below = self.least.filter(|least| self.value.is_none_or(|value| value < *least));
+        let above = self.most.filter(|most| self.value.is_none_or(|value| value > *most));
+        below.or(above).map(|limit| Miss {
+            figure: self.figure,
+            value: self.value.map(|value| self.scale * value),
+            limit: self.scale * limit,
+        })
+    }
+}
+
+fn at_most(figure: &'static str, value: Option<f64>, most: Option<f64>) -> Check {
+    Check { figure, scale: 1.0, value: value.map(f64::abs), least: None, most }
+}
+
+fn within(figure: &'static str, value: Option<f64>, range: Option<[f64; 2]>) -> Check {
+    let (least, most) = (range.map(|range| range[0]), range.map(|range| range[1]));
+    Check { figure, scale: 1.0, value, least, most }
+}
+
+fn percent(check: Check) -> Check {
+    Check { scale: 100.0, ..check }
+}
+
+/// What misses its limit; a limit that nothing was measured against is missed.
+pub fn misses(limits: &Limits, figures: &SetFigures) -> Vec<Miss> {
+    let (measured, silent) = (Some(figures.measured_share), Some(figures.silent_share));
+    let enough = limits.measured_share.map(|least| [least, 1.0]);
+    let checks = [
+        at_most("bias px", figures.bias_px, limits.bias_px),
+        at_most("bias mm", figures.bias_mm, limits.bias_mm),
+        at_most("RMSE px", figures.rmse_px, limits.rmse_px),
+        at_most("RMSE mm", figures.rmse_mm, limits.rmse_mm),
+        at_most("RMSE/free bound", figures.rmse_over_free_bound, limits.rmse_over_free_bound),
+        percent(within("measured %", measured, enough)),
+        percent(at_most("silent %", silent, limits.silent_share)),
+        within("RMS e/σ", figures.rms_over_sigma, limits.rms_over_sigma),
+        percent(within("in 95 %", figures.within_interval, limits.within_interval)),
+    ];
+    checks.into_iter().filter_map(Check::miss).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::studies::accuracy::verdict::*;
+
+    fn figures() -> SetFigures {
+        SetFigures {
+            set: "a set",
+            frames: 1000,
+            bias_px: Some(-0.04),
+            rmse_px: Some(0.05),
+            bound_px: 0.04,
+            rmse_over_bound: Some(1.25),
+            free_bound_px: 0.05,
+            rmse_over_free_bound: Some(1.0),
+            bias_mm: Some(-0.004),
+            rmse_mm: Some(0.005),
+            measured_share: 0.99,
+            silent_share: 1e-4,
+            rms_over_sigma: Some(0.9),
+            within_interval: Some(0.97),
+            kept: None,
+            missed: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn numbers_are_short_at_any_size() {
+        assert_eq!(
+            [0.0, 1.118_29, 0.005_034_4, 1393.511].map(short),
+            [0.0, 1.118, 0.005_034, 1394.0]
+        );
+    }
+
+    #[test]
+    fn a_figure_at_its_limit_keeps_it() {
+        assert_eq!(misses(&Limits::DISTURBED, &figures()), []);
+        assert_eq!(misses(&Limits::TRUST, &figures()), []);
+        assert_eq!(misses(&Limits::default(), &figures()), []);
+    }
+
+    #[test]
+    fn a_miss_names_the_figure_and_what_it_was_to_be() {
+        let said = |limits, figures: SetFigures| -> Vec<String> {
+            misses(&limits, &figures).iter().map(Miss::to_string).collect()
+        };
+        let expected = ["bias px 0.04 > 0.005", "measured % 99 < 100"];
+        assert_eq!(said(Limits::CLEAN, figures()), expected);
+        let silent = SetFigures { silent_share: 2e-4, ..figures() };
+        assert_eq!(said(Limits::CORNER, silent), ["silent % 0.02 > 0.01"]);
+        let wary = SetFigures { rms_over_sigma: Some(0.5), ..figures() };
+        assert_eq!(said(Limits::TRUST, wary), ["RMS e/σ 0.5 < 0.9"]);
+        let nothing = SetFigures { bias_px: None, ..figures() };
+        assert_eq!(said(Limits::CURVE, nothing), ["bias px none"]);
+    }
+}

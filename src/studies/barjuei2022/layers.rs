@@ -1,0 +1,84 @@
+//! The four layers.
+
+use super::disturbed::each;
+use super::{Contender, scale};
+use crate::cell::file::{Cell, RunPart};
+use crate::core::units::Mm;
+use crate::scenario::table::Level;
+use crate::sim::cell::SimError;
+use crate::sim::compare::{JUDGED_AFTER_MM, SCATTER_AFTER_MM};
+use crate::sim::score::{Score, median};
+use crate::sim::trial::Trial;
+use crate::vision::Method;
+
+/// What a layer came to, as the median over seeds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LayerResult {
+    /// Mean size of the error over the bead that was seen \[mm\].
+    pub mean_error_mm: f64,
+    /// Its root mean square \[mm\].
+    pub rms_error_mm: f64,
+    /// Mean speed with the start \[mm/s\].
+    pub mean_speed_mm_per_s: f64,
+    /// Mean size of the error of the bead itself, from 30 mm after control
+    /// began \[mm\].
+    pub bead_mean_error_mm: f64,
+    /// Its root mean square \[mm\].
+    pub bead_rms_error_mm: f64,
+    /// Integral of the size of its error from where control began \[mm²\].
+    pub error_integral_mm2: f64,
+    /// Scatter of the bead itself from 700 mm after control began \[mm\].
+    pub bead_scatter_mm: f64,
+    /// Way from where control began to within 0.5 mm of the target for good
+    /// \[mm\]; `None` where most seeds never get there.
+    pub settled_mm: Option<f64>,
+    /// Frames that were refused, over all seeds.
+    pub refused: u64,
+    /// Widths and speeds over path of the first seed.
+    pub example: Score,
+}
+
+/// Lays a layer with several seeds, in parallel, and takes medians.
+pub fn lay(cell: &Cell, run: &RunPart, seeds: u64) -> Result<LayerResult, SimError> {
+    let trials = each(seeds, |seed| Trial::lay(cell, run, &scale(), seed))?;
+    let of =
+        |value: &dyn Fn(&Trial) -> f64| median(&mut trials.iter().map(value).collect::<Vec<f64>>());
+    let settled = of(&|trial| trial.settles_within(trial.begun_mm, 0.5));
+    Ok(LayerResult {
+        mean_error_mm: of(&|trial| trial.score.mean_error()),
+        rms_error_mm: of(&|trial| trial.score.rms_error()),
+        mean_speed_mm_per_s: of(&|trial| trial.score.mean_speed()),
+        bead_mean_error_mm: of(&|trial| trial.mean_error(trial.begun_mm + JUDGED_AFTER_MM)),
+        bead_rms_error_mm: of(&|trial| trial.rms_error(trial.begun_mm + JUDGED_AFTER_MM)),
+        error_integral_mm2: of(&|trial| trial.error_integral(trial.begun_mm)),
+        bead_scatter_mm: of(&|trial| trial.scatter(trial.begun_mm + SCATTER_AFTER_MM)),
+        settled_mm: settled.is_finite().then_some(settled),
+        refused: trials.iter().map(|trial| trial.score.refused()).sum(),
+        example: trials.into_iter().next().map(|trial| trial.score).unwrap_or_default(),
+    })
+}
+
+/// Way from the beginning of a bead of which nothing was seen before control
+/// began to within 0.5 mm of the target for good \[mm\], as the median over
+/// seeds; infinite where it never gets there.
+pub fn settles_unseen(
+    (cell, run): (&Cell, &RunPart),
+    who: Contender,
+    target_mm: f64,
+    seeds: u64,
+) -> Result<f64, SimError> {
+    let (cell, mut run) = who.enter(cell, run, target_mm);
+    run.robot.start_length = Mm::ZERO;
+    let mut found =
+        each(seeds, |seed| Ok(Trial::lay(&cell, &run, &scale(), seed)?.settles_within(0.0, 0.5)))?;
+    Ok(median(&mut found))
+}
+
+/// The paper's cell with every frame rendered and measured by a method.
+pub fn with_frames(cell: &Cell, method: Method) -> Cell {
+    let mut cell = cell.clone();
+    cell.simulation.level = Level::Frames;
+    cell.simulation.roughness.size_mm = 0.1;
+    cell.gauge.method = method;
+    cell
+}

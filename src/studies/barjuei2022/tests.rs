@@ -1,0 +1,221 @@
+//! What the experiments must come to.
+
+use std::path::Path;
+
+use crate::cell::file::{Cell, Purpose, RunPart};
+use crate::core::units::Mm;
+use crate::sim::trial::Trial;
+use crate::studies::barjuei2022::*;
+use crate::vision::Method;
+
+fn cell() -> (Cell, RunPart) {
+    let text = include_str!("../../../cells/barjuei2022.toml");
+    let cell = Cell::parse(Path::new("barjuei2022.toml"), text, Purpose::Run).unwrap();
+    let run = cell.run.clone().unwrap();
+    (cell, run)
+}
+
+/// The same run with another width asked for.
+fn asked(run: &RunPart, target_mm: f64) -> RunPart {
+    let mut run = run.clone();
+    run.control.target = crate::width_control::target::Target::constant(Mm::constant(target_mm));
+    run
+}
+
+/// Simulated medians of 40 seeds by an independent program.
+const INDEPENDENT: [(f64, f64, f64, f64); 4] = [
+    (44.0, 1.46, 2.07, 71.6),
+    (42.0, 0.93, 1.35, 82.8),
+    (40.0, 0.54, 0.71, 99.6),
+    (38.0, 0.38, 0.48, 118.3),
+];
+
+#[test]
+fn the_papers_tables_come_out_as_in_an_independent_simulation() {
+    let (cell, run) = cell();
+    for (target, mean, rms, speed) in INDEPENDENT {
+        let found = lay(&cell, &asked(&run, target), 40).unwrap();
+        assert!((found.mean_error_mm - mean).abs() < 0.15, "{target}: {found:?}");
+        assert!((found.rms_error_mm - rms).abs() < 0.15, "{target}: {found:?}");
+        assert!((found.mean_speed_mm_per_s - speed).abs() < 4.0, "{target}: {found:?}");
+    }
+}
+
+#[test]
+fn the_same_seed_lays_the_same_bead() {
+    let (cell, run) = cell();
+    let once = Trial::lay(&cell, &run, &scale(), 7).unwrap();
+    assert_eq!(once, Trial::lay(&cell, &run, &scale(), 7).unwrap());
+    assert_ne!(once.bead, Trial::lay(&cell, &run, &scale(), 8).unwrap().bead);
+}
+
+#[test]
+fn five_millimetres_of_height_cost_the_single_scale_1_2_mm_and_the_full_calibration_none() {
+    let (cell, _) = cell();
+    let curve = stand_off(&cell).unwrap();
+    let at_5 = curve.iter().find(|point| point.nearer_mm == 5.0).unwrap();
+    assert!((at_5.scale_error_mm - 1.2).abs() < 0.1, "{at_5:?}");
+    for point in &curve {
+        assert!(point.full_error_mm.abs() < 0.02, "{point:?}");
+    }
+}
+
+#[test]
+fn a_second_layer_is_measured_where_it_lies() {
+    let (cell, run) = cell();
+    let mut cell = with_frames(&cell, Method::Caliper);
+    cell.simulation.path = Mm::constant(400.0);
+    let stack = stack(&cell, &run, 0.8).unwrap();
+    assert!((stack.offset_mm - 0.8).abs() < 0.02, "{stack:?}");
+    for (found, truth) in stack.widths_mm.iter().zip(stack.true_widths_mm) {
+        assert!((found - truth).abs() < 0.05, "{stack:?}");
+    }
+}
+
+/// Both columns of rates by distance.
+const RATES: [Rates; 2] = [Rates::PAPER, Rates::FAST];
+const SEEDS: u64 = 24;
+
+#[test]
+fn by_distance_a_layer_settles_within_millimetres_where_the_paper_needs_hundreds() {
+    let (mut cell, run) = cell();
+    cell.simulation.width_noise = Mm::ZERO;
+    for target in [44.0, 42.0, 40.0, 38.0] {
+        let lay_by = |who: Contender| {
+            let (cell, run) = who.enter(&cell, &run, target);
+            lay(&cell, &run, SEEDS).unwrap()
+        };
+        let theirs = lay_by(Contender::Paper);
+        for (rates, most, share) in [(RATES[0], 20.0, 8.0), (RATES[1], 15.0, 10.0)] {
+            let ours = lay_by(Contender::by_distance(rates));
+            let settled = ours.settled_mm.unwrap();
+            assert!(settled <= most, "{target} {rates:?}: {settled}");
+            let ratio = theirs.error_integral_mm2 / ours.error_integral_mm2;
+            assert!(ratio >= share, "{target} {rates:?}: 1/{ratio}");
+        }
+    }
+}
+
+#[test]
+fn by_distance_it_settles_soon_after_the_first_bead_is_seen() {
+    let (mut cell, run) = cell();
+    cell.simulation.width_noise = Mm::ZERO;
+    for target in [44.0, 42.0, 40.0, 38.0] {
+        for (rates, most) in [(RATES[0], 148.4), (RATES[1], 118.4)] {
+            let who = Contender::by_distance(rates);
+            let found = settles_unseen((&cell, &run), who, target, SEEDS).unwrap();
+            assert!(found <= most, "{target} {rates:?}: {found}");
+        }
+    }
+}
+
+#[test]
+fn by_distance_the_bead_itself_is_true_to_a_tenth_of_a_millimetre() {
+    let (cell, run) = cell();
+    for target in [44.0, 42.0, 40.0, 38.0] {
+        for (rates, mean, rms, scatter) in
+            [(RATES[0], 0.10, 0.14, 0.08), (RATES[1], 0.06, 0.105, 0.05)]
+        {
+            let (cell, run) = Contender::by_distance(rates).enter(&cell, &run, target);
+            let found = lay(&cell, &run, SEEDS).unwrap();
+            assert!(found.bead_mean_error_mm <= mean, "{target} {rates:?}: {found:?}");
+            assert!(found.bead_rms_error_mm <= rms, "{target} {rates:?}: {found:?}");
+            assert!(found.bead_scatter_mm <= scatter, "{target} {rates:?}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn by_distance_a_step_of_the_flow_is_answered_once_it_is_seen() {
+    let (mut cell, run) = cell();
+    cell.simulation.width_noise = Mm::ZERO;
+    for (rates, most) in [(RATES[0], 140.0), (RATES[1], 75.0)] {
+        let who = Contender::by_distance(rates);
+        let found = step_settles((&cell, &run), who, SEEDS).unwrap();
+        assert!(found <= most, "{rates:?}: {found}");
+    }
+}
+
+#[test]
+fn by_distance_slow_waves_and_pulsations_are_taken_out() {
+    let (cell, run) = cell();
+    let ratio =
+        |rates, what| unrest((&cell, &run), Contender::by_distance(rates), what, 6).unwrap();
+    for (wavelength, most) in [(2400.0, [0.43, 0.28]), (1200.0, [0.77, 0.55])] {
+        for (rates, most) in RATES.into_iter().zip(most) {
+            let found = ratio(rates, Disturbance::Wave(wavelength));
+            assert!(found <= most, "{wavelength} mm, {rates:?}: {found}");
+        }
+    }
+    for period in [1.0, 2.0, 3.5, 6.0] {
+        for (rates, most) in RATES.into_iter().zip([0.5, 0.35]) {
+            let found = ratio(rates, Disturbance::Pulsation(period));
+            assert!(found <= most, "{period} s, {rates:?}: {found}");
+        }
+    }
+}
+
+#[test]
+fn by_distance_what_is_told_wrong_and_widths_that_are_wrong_are_borne() {
+    let (cell, run) = cell();
+    let told = |rates, exponent, what| {
+        let who = Contender::Distance(rates, exponent);
+        wrong((&cell, &run), who, what, SEEDS).unwrap()
+    };
+    for rates in RATES {
+        let nominal = told(rates, 0.25, Wrong::NOTHING);
+        let cases = [
+            (0.25, Wrong { offset: 1.2, ..Wrong::NOTHING }),
+            (0.25, Wrong { offset: 0.8, ..Wrong::NOTHING }),
+            (0.375, Wrong::NOTHING),
+            (0.125, Wrong::NOTHING),
+            (0.25, Wrong { outliers: 0.1, ..Wrong::NOTHING }),
+            (0.25, Wrong { missing: 0.2, ..Wrong::NOTHING }),
+        ];
+        for (exponent, what) in cases {
+            let found = told(rates, exponent, what);
+            let ratio = found.median_mm / nominal.median_mm;
+            assert!(ratio <= 1.5, "{rates:?}, b {exponent}, {what:?}: {found:?} is {ratio}");
+            let ratio = found.mean_mm / nominal.mean_mm;
+            assert!(ratio <= 1.5, "{rates:?}, b {exponent}, {what:?}: {found:?} is {ratio}");
+        }
+        // All of it at once, in any direction.
+        for (exponent, offset) in [(0.375, 1.2), (0.125, 1.2), (0.375, 0.8), (0.125, 0.8)] {
+            let found = told(rates, exponent, Wrong { offset, outliers: 0.1, missing: 0.2 });
+            let ratio = found.median_mm / nominal.median_mm;
+            assert!(ratio <= 1.8, "{rates:?}, b {exponent}, {offset}: {found:?} is {ratio}");
+        }
+    }
+}
+
+#[test]
+fn twenty_layers_are_measured_alike_at_every_height() {
+    let (cell, run) = cell();
+    let storeys = tower(&cell, &run, 20).unwrap();
+    assert_eq!(storeys.len(), 20);
+    for storey in &storeys {
+        assert!(storey.widths > 100, "{storey:?}");
+        assert!(storey.measured_error_mm.abs() < 0.05, "{storey:?}");
+        assert!(storey.laid_error_mm.abs() < 0.05, "{storey:?}");
+    }
+    // The first layer teaches the bead; those above begin with what it taught.
+    assert!(storeys[1..].iter().all(|storey| storey.laid_error_mm.abs() < 0.03), "{storeys:?}");
+}
+
+#[test]
+fn by_distance_a_rough_bead_is_not_chased() {
+    let (mut cell, run) = cell();
+    cell.simulation.roughness.size_mm = 0.5;
+    cell.simulation.roughness.length_mm = 8.0;
+    let nobody = Contender::Paper.enter(&cell, &run, 42.0);
+    let (cell, mut run) = Contender::by_distance(RATES[1]).enter(&nobody.0, &run, 42.0);
+    let scatter = |run: &RunPart| {
+        let square = |seed| Trial::lay(&cell, run, &scale(), seed).unwrap().scatter(700.0).powi(2);
+        ((0..SEEDS).map(square).sum::<f64>() / f64::from(u32::try_from(SEEDS).unwrap())).sqrt()
+    };
+    let held = scatter(&run);
+    // The same bead at a steady speed.
+    run.robot.start_length = Mm::constant(1e5);
+    let alone = scatter(&run);
+    assert!(held < 1.2 * alone, "{held} beside {alone}");
+}

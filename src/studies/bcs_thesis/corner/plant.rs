@@ -1,0 +1,197 @@
+//! A run through the corner: voltage to flow to what is laid along the path.
+
+use super::{BEAD, CornerError, Errors, JUDGED_MM, Scenario, UNMODELLED};
+use crate::numeric::lti::{Between, Simulator};
+use crate::plan::SpeedProfile;
+use crate::sim::hash::{mix, normal_pair};
+use crate::studies::bcs_thesis::{drive, flow};
+
+/// Step of the plant \[s\].
+const STEP_S: f64 = 0.001;
+/// Distance of the places that are judged \[mm\], and how many there are on either side.
+const EVERY_MM: f64 = 0.5;
+const PLACES: i32 = 200;
+/// A flow that differs by less than this share from that before the corner is not changed.
+const CHANGED: f64 = 0.01;
+
+/// A run as the model has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    speed: SpeedProfile,
+    /// Every millisecond \[mm³/s\].
+    flow: Vec<f64>,
+}
+
+/// By which share the width is off along the path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Laid {
+    errors: Vec<f64>,
+}
+
+impl Laid {
+    /// Root mean square within ±100 mm of the corner.
+    pub fn rms(&self) -> f64 {
+        mean_square(&self.errors).sqrt()
+    }
+
+    /// At the judged place nearest to one \[mm\].
+    pub fn at(&self, path_mm: f64) -> f64 {
+        let nearest = places()
+            .zip(&self.errors)
+            .min_by(|a, b| (a.0 - path_mm).abs().total_cmp(&(b.0 - path_mm).abs()));
+        nearest.map_or(0.0, |(_, error)| *error)
+    }
+
+    /// Places \[mm\] and errors.
+    pub fn along(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        places().zip(self.errors.iter().copied())
+    }
+}
+
+impl Run {
+    /// Of a speed and a voltage over time, which is held from one command to the next and
+    /// kept within the drive's limits. The extruder has settled at the first voltage.
+    pub fn new(
+        scenario: &Scenario,
+        speed: &SpeedProfile,
+        voltage: impl Fn(f64) -> f64,
+    ) -> Result<Self, CornerError> {
+        let limits = scenario.drive()?;
+        let period = 1.0 / f64::from(scenario.rate_hz);
+        let mut g1 = Simulator::new(&drive()?, STEP_S, Between::Held)?;
+        let mut g2 = Simulator::new(&flow()?, STEP_S, Between::Linear)?;
+        let mut command = voltage(0.0);
+        g1.settle(command)?;
+        g2.settle(command * drive()?.dc_gain())?;
+        let held = crate::core::time::Span::from_secs(period);
+        let mut next = 0.0;
+        let mut flow = Vec::new();
+        for now in moments(speed.duration_s()) {
+            if now + 0.5 * STEP_S >= next {
+                // The middle of the time for which it is held.
+                (command, _) = limits.apply(voltage(now + 0.5 * period), command, held);
+                next += period;
+            }
+            flow.push(g2.step(g1.step(command)));
+        }
+        Ok(Self { speed: speed.clone(), flow })
+    }
+
+    /// Place \[mm\], speed \[mm/s\] and flow \[mm³/s\], every millisecond within ±100 mm of the
+    /// corner.
+    pub fn course(&self) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
+        let all = moments(self.speed.duration_s()).zip(&self.flow).map(|(now, flow)| {
+            let path_mm = self.speed.path_at(now);
+            (path_mm, self.speed.speed_at(path_mm), *flow)
+        });
+        all.filter(|(path_mm, ..)| path_mm.abs() <= JUDGED_MM)
+    }
+
+    /// What is laid as the model has it.
+    pub fn quiet(&self) -> Laid {
+        self.quiet_over(BEAD.nozzle_mm)
+    }
+
+    /// The same as the mean over another length than the nozzle's \[mm\].
+    pub fn quiet_over(&self, length_mm: f64) -> Laid {
+        self.laid(&self.flow, length_mm)
+    }
+
+    /// Error without and with flow that no model tells.
+    pub fn errors(&self, seeds: u64) -> Errors {
+        let noisy = (0..seeds).map(|seed| mean_square(&self.noisy(seed).errors)).sum::<f64>();
+        #[expect(clippy::cast_precision_loss, reason = "a few seeds")]
+        let count = seeds.max(1) as f64;
+        Errors { quiet: self.quiet().rms(), noisy: (noisy / count).sqrt() }
+    }
+
+    /// What is laid with flow that no model tells, which hangs together over its
+    /// correlation time.
+    pub fn noisy(&self, seed: u64) -> Laid {
+        let sigma = UNMODELLED.share * self.change();
+        let kept = libm::exp(-STEP_S / UNMODELLED.correlation_s);
+        let fresh = (1.0 - kept * kept).sqrt();
+        let mut noise = normal_pair(mix(&[seed, 3, 0]))[0];
+        let flow = (1_u64..).zip(&self.flow).map(|(step, flow)| {
+            let here = flow + sigma * noise;
+            noise = kept * noise + fresh * normal_pair(mix(&[seed, 3, step]))[0];
+            here
+        });
+        self.laid(&flow.collect::<Vec<f64>>(), BEAD.nozzle_mm)
+    }
+
+    /// Root mean square that the noise alone is expected to leave.
+    pub fn floor(&self) -> f64 {
+        let sigma = UNMODELLED.share * self.change();
+        let (full, half) = (BEAD.area_mm2 * BEAD.nozzle_mm, 0.5 * BEAD.nozzle_mm);
+        let spread: Vec<f64> = places()
+            .map(|at| UNMODELLED.spread(self.time(at + half) - self.time(at - half)).sqrt())
+            .collect();
+        sigma / full * mean_square(&spread).sqrt()
+    }
+
+    /// Standard deviation of the flow's change \[mm³/s\]: over the time in which the path
+    /// that is judged is laid, or over the whole manoeuvre, from the first change of the
+    /// flow to the last; the larger of the two.
+    pub fn change(&self) -> f64 {
+        let first = self.flow.first().copied().unwrap_or(0.0);
+        let changed = |flow: &f64| (flow - first).abs() > CHANGED * first;
+        let judged = [-JUDGED_MM, JUDGED_MM].map(|at| whole(self.speed.time_at(at) / STEP_S));
+        let from = self.flow.iter().position(changed).unwrap_or(judged[0]).min(judged[0]);
+        let to = self.flow.iter().rposition(changed).unwrap_or(judged[1]).max(judged[1]);
+        deviation(&self.flow, from, to).max(deviation(&self.flow, judged[0], judged[1]))
+    }
+
+    /// When the nozzle's middle is at a place \[s\].
+    fn time(&self, path_mm: f64) -> f64 {
+        self.speed.time_at(path_mm)
+    }
+
+    fn laid(&self, flow: &[f64], length_mm: f64) -> Laid {
+        let mut sum = 0.0;
+        let pairs = flow.iter().zip(flow.iter().skip(1));
+        let volume: Vec<f64> = std::iter::once(0.0)
+            .chain(pairs.map(|(a, b)| {
+                sum += 0.5 * STEP_S * (a + b);
+                sum
+            }))
+            .collect();
+        let (full, half) = (BEAD.area_mm2 * length_mm, 0.5 * length_mm);
+        let at = |time_s: f64| {
+            let step = whole(time_s / STEP_S).min(volume.len().saturating_sub(2));
+            let first = volume.get(step).copied().unwrap_or(0.0);
+            let next = volume.get(step + 1).copied().unwrap_or(first);
+            #[expect(clippy::cast_precision_loss, reason = "a few seconds of milliseconds")]
+            let share = time_s / STEP_S - step as f64;
+            first + share * (next - first)
+        };
+        let errors =
+            places().map(|s| (at(self.time(s + half)) - at(self.time(s - half))) / full - 1.0);
+        Laid { errors: errors.collect() }
+    }
+}
+
+/// Places that are judged \[mm\].
+fn places() -> impl Iterator<Item = f64> {
+    (-PLACES..=PLACES).map(|k| EVERY_MM * f64::from(k))
+}
+
+/// Milliseconds from 0 s on \[s\].
+fn moments(until_s: f64) -> impl Iterator<Item = f64> {
+    (0_u32..).map(|step| STEP_S * f64::from(step)).take_while(move |now| *now <= until_s + STEP_S)
+}
+
+fn mean_square(values: &[f64]) -> f64 {
+    crate::sim::score::mean(values.iter().map(|value| value * value))
+}
+
+fn deviation(flow: &[f64], from: usize, to: usize) -> f64 {
+    let part = flow.get(from..to.min(flow.len())).unwrap_or_default();
+    let mean = crate::sim::score::mean(part.iter().copied());
+    crate::sim::score::mean(part.iter().map(|q| (q - mean).powi(2))).sqrt()
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a short time")]
+fn whole(steps: f64) -> usize {
+    steps.max(0.0) as usize
+}

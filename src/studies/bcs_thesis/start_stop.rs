@@ -1,0 +1,7 @@
+//! Starts and stops beside fixed dwell times, as the thesis has them.
+
+pub mod dwell;
+pub mod experiment;
+
+#[cfg(test)]
+mod tests;

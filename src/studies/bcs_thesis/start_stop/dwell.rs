@@ -1,0 +1,73 @@
+//! Fixed dwell times, as printers have them, and the best of them.
+
+use rayon::prelude::*;
+
+use crate::core::time::Span;
+use crate::extruder::start_stop::Pause;
+use crate::sim::start_stop::bead::{Bench, Score, Strategy};
+use crate::sim::start_stop::melt::Machine;
+
+/// The same times at every start and every stop. bcs-thesis, section 1.3.4.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dwell {
+    /// From the command to run until the robot goes \[s\].
+    pub start_s: f64,
+    /// From the command to stop until the end of the bead \[s\].
+    pub stop_s: f64,
+    /// Speed of the robot \[mm/s\].
+    pub speed_mm_per_s: f64,
+}
+
+impl Strategy for Dwell {
+    fn begins(&self, _: &Pause) -> (f64, impl Fn(Span) -> f64) {
+        (self.start_s, |_| 1.0)
+    }
+
+    fn ends(&self) -> (f64, impl Fn(Span) -> f64) {
+        (self.speed_mm_per_s * self.stop_s, |_| 1.0)
+    }
+}
+
+/// Longest dwell times that are tried \[s\].
+const LONGEST_S: [f64; 2] = [4.0, 1.5];
+/// Halvings of a range by the golden section.
+const STEPS: u32 = 8;
+/// Steps of the coarse row.
+const COARSE: u32 = 10;
+/// Turns between the two times.
+const ROUNDS: u32 = 2;
+
+/// The pair of dwell times with the least void and drool over all these pauses
+/// and seeds: as well as fixed times can be tuned.
+pub fn tune(bench: &Bench, machine: Machine, idle_s: &[f64], seeds: std::ops::Range<u64>) -> Dwell {
+    let cost = |dwell: &Dwell| -> f64 {
+        let of = |seed| bench.lay(machine, seed, dwell, idle_s);
+        // Collected, so that the sum does not hang on which seed ends first.
+        let scores: Vec<Vec<Score>> = seeds.clone().into_par_iter().map(of).collect();
+        scores.iter().flatten().map(Score::sum_mm3).sum()
+    };
+    let speed_mm_per_s = bench.laid.speed.get();
+    let mut best = Dwell { start_s: 1.0, stop_s: 0.3, speed_mm_per_s };
+    for _ in 0..ROUNDS {
+        let [start_most, stop_most] = LONGEST_S;
+        best.start_s = least(start_most, |start_s| cost(&Dwell { start_s, ..best }));
+        best.stop_s = least(stop_most, |stop_s| cost(&Dwell { stop_s, ..best }));
+    }
+    best
+}
+
+/// Where a function from zero to an end is least: the best of a coarse row,
+/// then the golden section about it.
+fn least(most: f64, cost: impl Fn(f64) -> f64) -> f64 {
+    let step = most / f64::from(COARSE);
+    let coarse = (0..=COARSE).map(|k| f64::from(k) * step);
+    let costs = coarse.map(|at| (at, cost(at)));
+    let near = costs.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(at, _)| at);
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let (mut low, mut high) = ((near - step).max(0.0), near + step);
+    for _ in 0..STEPS {
+        let [left, right] = [high - golden * (high - low), low + golden * (high - low)];
+        if cost(left) < cost(right) { high = right } else { low = left }
+    }
+    0.5 * (low + high)
+}

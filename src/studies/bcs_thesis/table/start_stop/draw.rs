@@ -1,0 +1,86 @@
+//! The plots of starts and stops.
+
+use maud::{Markup, html};
+
+use crate::report::run::area::{Area, XAxis};
+use crate::report::run::legend::legend;
+use crate::report::run::palette::{DEMAND, FLOW, Ink, OURS, PAPER, SETPOINT, SPEED};
+use crate::report::run::pauses::{Drawn, over_pauses};
+use crate::report::run::plot::{Layer, Plot, y_range};
+use crate::sim::start_stop::{IDLE_S, Moment, Score};
+use crate::studies::bcs_thesis::start_stop::experiment::{Found, Losses, WATCHED_IDLE_S, bench};
+use crate::studies::reproduce::series;
+
+/// A start is over, and a stop nearly, after this \[s\].
+const SHOWN_S: f64 = 3.0;
+
+type Points = Vec<(f64, f64)>;
+
+/// Volumes over the pause, and a stop and a start over time.
+pub fn all(found: &Found) -> Markup {
+    let [fixed, ours] = &found.watched;
+    html! {
+        (legend(&[("no dwell", DEMAND, ""), ("best fixed dwell", PAPER, ""),
+            ("ours, robot keeps its speed", SETPOINT, ""), ("ours, robot follows", OURS, "")]))
+        (volumes(found, "void and drool [mm³]", Score::sum_mm3))
+        (volumes(found, "void [mm³]", |score| score.void_mm3))
+        (volumes(found, "drool [mm³]", |score| score.drool_mm3))
+        (legend(&[("flow at the nozzle", FLOW, ""), ("flow that the robot's speed takes", SPEED, "")]))
+        @for (name, watched) in [("best fixed dwell", fixed), ("ours, robot follows", ours)] {
+            div.pair {
+                (flows(&watched.stop, &format!("{name}: flow after the stop [mm³/s]")))
+                (flows(&watched.start, &format!(
+                    "{name}: flow after a pause of {WATCHED_IDLE_S} s [mm³/s]"
+                )))
+            }
+        }
+        (legend(&[("best fixed dwell", PAPER, ""), ("ours, robot follows", OURS, "")]))
+        div.pair {
+            (speeds([&fixed.stop, &ours.stop], "robot's share of its speed after the stop"))
+            (speeds([&fixed.start, &ours.start], "robot's share of its speed after the start"))
+        }
+    }
+}
+
+fn volumes(found: &Found, title: &str, of: fn(&Score) -> f64) -> Markup {
+    let points =
+        |losses: &Losses| -> Points { IDLE_S.iter().copied().zip(losses.iter().map(of)).collect() };
+    let ways = [
+        (points(&found.naive), DEMAND),
+        (points(&found.fixed), PAPER),
+        (points(&found.keeps), SETPOINT),
+        (points(&found.follows), OURS),
+    ];
+    let drawn = ways.each_ref().map(|(points, ink)| Drawn::Marked(points, *ink));
+    over_pauses(Area::wide(220.0), title, &drawn)
+}
+
+fn flows(moments: &[Moment], title: &str) -> Markup {
+    let flow = shown(moments, |moment| moment.flow_mm3_per_s);
+    let wanted = shown(moments, |moment| moment.wanted_mm3_per_s);
+    plot(title, &[(wanted, SPEED), (flow, FLOW)])
+}
+
+fn speeds([fixed, ours]: [&[Moment]; 2], title: &str) -> Markup {
+    let full = bench(1.0).laid.flow.get();
+    let share = |moments| shown(moments, |moment: &Moment| moment.wanted_mm3_per_s / full);
+    plot(title, &[(share(fixed), PAPER), (share(ours), OURS)])
+}
+
+fn shown(moments: &[Moment], of: impl Fn(&Moment) -> f64) -> Points {
+    let near = moments.iter().filter(|moment| moment.since_s <= SHOWN_S);
+    near.map(|moment| (moment.since_s, of(moment))).collect()
+}
+
+fn plot(title: &str, curves: &[(Points, Ink)]) -> Markup {
+    let axis = XAxis {
+        title: "time since the command [s]".to_owned(),
+        range: (0.0, SHOWN_S),
+        divisor: 1.0,
+    };
+    let drawn: Vec<_> = curves.iter().map(|(points, ink)| (series(points), *ink)).collect();
+    let all: Vec<_> = drawn.iter().map(|(series, _)| series).collect();
+    let y_range = y_range(&all, &[0.0]);
+    let layers = drawn.iter().map(|(series, ink)| Layer::Curve(series, *ink)).collect();
+    Plot { area: Area::half(220.0), x: &axis, y_title: title, y_range, layers }.draw()
+}

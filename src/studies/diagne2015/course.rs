@@ -1,0 +1,142 @@
+//! What a run went through, and the figures that it is judged by.
+
+/// One moment of a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Since the start \[s\].
+    pub at_s: f64,
+    /// Length of the plug \[mm\].
+    pub plug_mm: f64,
+    /// Share of full that is fed.
+    pub fill: f64,
+    /// Foretold length of the plug when that arrives \[mm\], and when \[s\].
+    pub foretold: Option<(f64, f64)>,
+    /// Delay of what arrives \[s\].
+    pub delay_s: f64,
+}
+
+/// A run, sample by sample.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Course {
+    /// In order of time, a step apart.
+    pub samples: Vec<Sample>,
+}
+
+/// A swing that stays.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cycle {
+    /// From the lowest to the highest length of the plug \[mm\].
+    pub peak_to_peak_mm: f64,
+    /// Time from one pass in a direction to the next \[s\].
+    pub period_s: f64,
+}
+
+impl Course {
+    /// When the plug came nearer to a length than `within_mm` for good \[s\].
+    pub fn settles(&self, plug_mm: f64, within_mm: f64) -> Option<f64> {
+        let outside = |sample: &Sample| (sample.plug_mm - plug_mm).abs() > within_mm;
+        let inside = self.samples.iter().rposition(outside).map_or(0, |last| last + 1);
+        self.samples.get(inside).map(|sample| sample.at_s)
+    }
+
+    /// How far the plug went beyond a length \[mm\].
+    pub fn overshoot_mm(&self, plug_mm: f64) -> f64 {
+        self.samples.iter().map(|sample| sample.plug_mm - plug_mm).fold(0.0, f64::max)
+    }
+
+    /// Root mean square distance from a length after a moment \[mm\].
+    pub fn rms_mm(&self, plug_mm: f64, after_s: f64) -> f64 {
+        let late = self.after(after_s);
+        let sum: f64 = late.iter().map(|sample| (sample.plug_mm - plug_mm).powi(2)).sum();
+        (sum / count(late)).sqrt()
+    }
+
+    /// Root mean square change of the feed from step to step, after a moment:
+    /// how much the feeder is shaken.
+    pub fn shaking(&self, after_s: f64) -> f64 {
+        let late = self.after(after_s);
+        let sum: f64 = late.windows(2).map(|pair| change(pair).powi(2)).sum();
+        (sum / count(late)).sqrt()
+    }
+
+    /// The swing about a length after a moment; none where the plug keeps still
+    /// to a tenth of a millimetre or does not pass the length four times. The
+    /// period is twice the median time from one pass to the next, because it
+    /// changes with a conveying speed that pulsates slowly.
+    pub fn cycle(&self, plug_mm: f64, after_s: f64) -> Option<Cycle> {
+        let late = self.after(after_s);
+        let (low, high) = late.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), s| {
+            (low.min(s.plug_mm), high.max(s.plug_mm))
+        });
+        let passes: Vec<f64> = late.windows(2).filter_map(|pair| pass(pair, plug_mm)).collect();
+        let mut halves: Vec<f64> = passes.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        if halves.len() < 3 || high - low < 0.1 {
+            return None;
+        }
+        halves.sort_by(f64::total_cmp);
+        let half = halves.get(halves.len() / 2)?;
+        Some(Cycle { peak_to_peak_mm: high - low, period_s: 2.0 * half })
+    }
+
+    /// Largest distance from a row of lengths that are a sample apart \[mm\],
+    /// of which the first belongs to the sample number `from`.
+    pub fn misses(&self, from: usize, lengths_mm: impl Iterator<Item = f64>) -> f64 {
+        let late = self.samples.get(from..).unwrap_or_default();
+        late.iter()
+            .zip(lengths_mm)
+            .map(|(s, length)| (s.plug_mm - length).abs())
+            .fold(0.0, f64::max)
+    }
+
+    fn after(&self, after_s: f64) -> &[Sample] {
+        let first = self.samples.partition_point(|sample| sample.at_s < after_s);
+        self.samples.get(first..).unwrap_or_default()
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "far fewer samples than 2⁵³")]
+fn count(samples: &[Sample]) -> f64 {
+    samples.len().max(1) as f64
+}
+
+fn change(pair: &[Sample]) -> f64 {
+    if let [one, two] = pair { two.fill - one.fill } else { 0.0 }
+}
+
+/// When a pair of samples passes a level in either direction.
+fn pass(pair: &[Sample], level: f64) -> Option<f64> {
+    let [one, two] = pair else { return None };
+    if (one.plug_mm < level) == (two.plug_mm < level) {
+        return None;
+    }
+    let share = (level - one.plug_mm) / (two.plug_mm - one.plug_mm);
+    Some(one.at_s + share * (two.at_s - one.at_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::studies::diagne2015::course::*;
+
+    fn course(plug: impl Fn(f64) -> f64) -> Course {
+        let sample = |k: u32| {
+            let at_s = 0.001 * f64::from(k);
+            Sample { at_s, plug_mm: plug(at_s), fill: 0.0, foretold: None, delay_s: 0.0 }
+        };
+        Course { samples: (0..10_000).map(sample).collect() }
+    }
+
+    #[test]
+    fn settling_is_for_good_and_a_swing_is_measured() {
+        let falling = course(|at| 160.0 - 60.0 * (-at).exp());
+        let settled = falling.settles(160.0, 3.2).unwrap();
+        assert!((settled - (60.0_f64 / 3.2).ln()).abs() < 1.1e-3);
+        assert_eq!(falling.overshoot_mm(160.0), 0.0);
+        let swing = course(|at| 160.0 + 4.4 * (std::f64::consts::TAU * at / 1.6).sin());
+        assert_eq!(swing.settles(160.0, 3.2), None);
+        let cycle = swing.cycle(160.0, 2.0).unwrap();
+        assert!((cycle.peak_to_peak_mm - 8.8).abs() < 1e-3);
+        assert!((cycle.period_s - 1.6).abs() < 1e-6);
+        assert!((swing.rms_mm(160.0, 2.0) - 4.4 / 2_f64.sqrt()).abs() < 1e-2);
+        assert!(falling.cycle(160.0, 2.0).is_none());
+    }
+}

@@ -1,0 +1,150 @@
+//! One run: a plant, what the control knows of it, and how the plug is measured.
+
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::course::{Course, Sample};
+use super::{SETPOINT, START};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::Mm;
+use crate::extruder::screw::control::{Scheme, ScrewSettings};
+use crate::extruder::screw::{FillLaw, Screw, ScrewControl, ScrewError, ScrewFault};
+use crate::sim::screw::{Integrator, SimScrew};
+
+const MM_PER_M: f64 = 1000.0;
+
+/// What feeds the screw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Method {
+    /// The share that holds the setpoint, from the start on.
+    OpenLoop,
+    /// The law on the measured plug, as if there were no delay.
+    Uncompensated(FillLaw),
+    /// The law on the foretold plug.
+    Predictor {
+        /// The law.
+        law: FillLaw,
+        /// How the prediction is computed.
+        scheme: Scheme,
+        /// What the predictor knows of the screw.
+        known: Screw,
+    },
+}
+
+/// How a run is made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plan {
+    /// The plant.
+    pub screw: Screw,
+    /// How the plant is integrated.
+    pub integrator: Integrator,
+    /// Step of the plant \[ms\].
+    pub step_ms: u32,
+    /// Steps of the plant between two of the control.
+    pub hold: u32,
+    /// Length of the run \[s\].
+    pub until_s: f64,
+    /// Standard deviation of the measured plug \[mm\].
+    pub noise_mm: f64,
+    /// Seed of that noise.
+    pub seed: u64,
+}
+
+impl Plan {
+    /// The paper's: plant and control by Euler steps of a millisecond.
+    pub fn paper(screw: Screw, until_s: f64) -> Self {
+        let integrator = Integrator::Euler;
+        Self { screw, integrator, step_ms: 1, hold: 1, until_s, noise_mm: 0.0, seed: 0 }
+    }
+
+    /// The same with a plant that is integrated to high order.
+    pub fn exact(screw: Screw, until_s: f64) -> Self {
+        Self { integrator: Integrator::RungeKutta(1e-3), ..Self::paper(screw, until_s) }
+    }
+
+    /// Time between two steps of the control.
+    pub fn period(&self) -> Span {
+        Span::from_millis(i64::from(self.step_ms) * i64::from(self.hold))
+    }
+}
+
+/// Why a run could not be made.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum RunError {
+    /// Parameters that do not fit.
+    #[error(transparent)]
+    Screw(#[from] ScrewError),
+    /// The control gave up.
+    #[error("at {at_s:.3} s: {fault}")]
+    Fault {
+        /// When \[s\].
+        at_s: f64,
+        /// Why.
+        fault: ScrewFault,
+    },
+}
+
+/// Runs it, from a plug that has been held at the start.
+pub fn follow(plan: &Plan, method: &Method) -> Result<Course, RunError> {
+    let start_m = START.get() / MM_PER_M;
+    let before = plan.screw.holding(start_m);
+    let step_s = f64::from(plan.step_ms) / 1000.0;
+    let mut plant = SimScrew::new(plan.screw, plan.integrator, step_s, start_m, before);
+    let mut feeder = Feeder::new(plan, method, before)?;
+    let mut noise = Xoshiro256PlusPlus::seed_from_u64(plan.seed);
+    let mut course = Course::default();
+    let mut fed = (before, None);
+    for tick in 0_u32.. {
+        let at_s = plant.now_s();
+        if at_s > plan.until_s {
+            break;
+        }
+        let plug_mm = plant.plug_m() * MM_PER_M;
+        if tick % plan.hold == 0 {
+            let draw: f64 = StandardNormal.sample(&mut noise);
+            let measured = Mm::new(plug_mm + plan.noise_mm * draw).unwrap_or_default();
+            fed = feeder.feed(tick * plan.step_ms, measured)?;
+        }
+        let (fill, foretold) = fed;
+        course.samples.push(Sample { at_s, plug_mm, fill, foretold, delay_s: plant.delay_s() });
+        plant.advance(fill);
+    }
+    Ok(course)
+}
+
+/// What feeds, with its memory.
+enum Feeder {
+    Constant(f64),
+    Law(FillLaw),
+    Control(ScrewControl),
+}
+
+/// A share, and the plug that was foretold \[mm\] with its moment \[s\].
+type Fed = (f64, Option<(f64, f64)>);
+
+impl Feeder {
+    fn new(plan: &Plan, method: &Method, before: f64) -> Result<Self, ScrewError> {
+        Ok(match *method {
+            Method::OpenLoop => Self::Constant(plan.screw.holding(SETPOINT.plug.get() / MM_PER_M)),
+            Method::Uncompensated(law) => Self::Law(law),
+            Method::Predictor { law, scheme, known } => {
+                let period = plan.period();
+                let settings = ScrewSettings { screw: known, law, scheme, period, before };
+                Self::Control(ScrewControl::new(&settings)?)
+            }
+        })
+    }
+
+    fn feed(&mut self, at_ms: u32, plug: Mm) -> Result<Fed, RunError> {
+        let now = Stamp::from_ns(u64::from(at_ms) * 1_000_000);
+        match self {
+            Self::Constant(fill) => Ok((*fill, None)),
+            Self::Law(law) => Ok((law.fill(plug.get() / MM_PER_M), None)),
+            Self::Control(control) => match control.step(now, plug) {
+                Ok(step) => Ok((step.fill, Some((step.plug.get(), step.arrival.secs())))),
+                Err(fault) => Err(RunError::Fault { at_s: now.secs(), fault }),
+            },
+        }
+    }
+}

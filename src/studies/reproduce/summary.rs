@@ -1,0 +1,135 @@
+//! What a source's table comes to, in a line: how many of the published numbers
+//! the paper's own method meets in our simulation, and which one it misses most.
+
+use maud::{Markup, html};
+
+use super::table::number;
+use super::{Reproduced, Row};
+
+/// Shares of a published number within which it counts as met.
+const NEAR: [f64; 2] = [0.02, 0.1];
+
+/// Counts of rows with a published number.
+#[derive(Debug)]
+pub struct Summary<'a> {
+    /// Rows that have one.
+    pub published: usize,
+    /// Those of them that were simulated to within 2 % and 10 %.
+    pub near: [usize; 2],
+    /// The one that is furthest off as a share of the published number, and that
+    /// share; none where nothing can be compared.
+    pub furthest: Option<(&'a Row, f64)>,
+    /// Those that the simulation never gets to.
+    pub absent: usize,
+}
+
+impl<'a> Summary<'a> {
+    /// Of a source's rows.
+    pub fn of(rows: &'a [Row]) -> Self {
+        let published = || rows.iter().filter_map(|row| Some((row, row.published?)));
+        let off: Vec<(&Row, f64)> = published()
+            .filter_map(|(row, told)| {
+                let by = (row.simulated? - told).abs();
+                // Nothing is met by nothing alone.
+                Some((row, if by == 0.0 { 0.0 } else { by / told.abs() }))
+            })
+            .collect();
+        Self {
+            published: published().count(),
+            near: NEAR.map(|share| off.iter().filter(|(_, by)| *by <= share).count()),
+            furthest: off.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)),
+            absent: published().filter(|(row, _)| row.simulated.is_none()).count(),
+        }
+    }
+
+    /// The row that is furthest off, in words.
+    fn furthest(&self) -> String {
+        self.furthest.map_or_else(
+            || "–".to_owned(),
+            |(row, _)| {
+                let Row { case, quantity, unit, .. } = row;
+                let unit = if *unit == "1" { String::new() } else { format!(" {unit}") };
+                let [published, simulated] = [row.published, row.simulated].map(number);
+                format!(
+                    "{case}, {quantity}: {published}{unit} published, {simulated}{unit} simulated"
+                )
+            },
+        )
+    }
+
+    /// In a sentence.
+    pub fn text(&self) -> String {
+        let Self { published, near: [close, near], absent, .. } = self;
+        if *published == 0 {
+            return "The paper gives no number to compare with.".to_owned();
+        }
+        let absent = match absent {
+            0 => String::new(),
+            some => format!(", {some} not reached"),
+        };
+        format!(
+            "Of {published} published numbers {close} are simulated to within 2 %, {near} to within \
+             10 %{absent}. Furthest off: {}.",
+            self.furthest()
+        )
+    }
+}
+
+/// The sources one below the other, at the head of the page.
+pub fn markup(sources: &[Reproduced]) -> Markup {
+    html! {
+        section {
+            h2 { "Summary" }
+            p.hint {
+                b { "Published" } " is the number in the paper, " b { "simulated" }
+                " what the paper's own method gives in this program's simulation, and " b { "ours" }
+                " what this program's best method gives on the same plant. In the plots the paper's \
+                 method is orange, ours is blue."
+            }
+            div.wide { table {
+                thead { tr {
+                    th { "source" } th.number { "published numbers" } th.number { "within 2 %" }
+                    th.number { "within 10 %" } th.number { "not reached" } th { "furthest off" }
+                } }
+                tbody { @for (at, source) in sources.iter().enumerate() {
+                    @let summary = Summary::of(&source.rows);
+                    tr {
+                        td { a href={ "#source-" (at) } { (source.title) } }
+                        td.number { (summary.published) }
+                        @for near in summary.near { td.number { (near) } }
+                        td.number { (summary.absent) }
+                        td { (summary.furthest()) }
+                    }
+                } }
+            } }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::studies::reproduce::summary::*;
+
+    fn row(published: Option<f64>, simulated: Option<f64>) -> Row {
+        let (seed, case, quantity) = ("ma2026", "step".to_owned(), "overshoot");
+        Row { seed, case, quantity, unit: "%", published, simulated, ours: None }
+    }
+
+    #[test]
+    fn what_is_met_and_what_is_missed_is_counted() {
+        let rows = [
+            row(Some(10.0), Some(10.1)),
+            row(Some(0.0), Some(0.0)),
+            row(Some(-2.0), Some(-2.16)),
+            row(Some(4.0), Some(5.0)),
+            row(Some(7.0), None),
+            row(None, Some(3.0)),
+        ];
+        let summary = Summary::of(&rows);
+        assert_eq!((summary.published, summary.near, summary.absent), (5, [2, 3], 1));
+        let said = summary.text();
+        assert!(said.starts_with("Of 5 published numbers 2 are simulated to within 2 %"), "{said}");
+        assert!(said.contains("1 not reached. Furthest off: step, overshoot: 4.00 %"), "{said}");
+        assert!(Summary::of(&rows[5..]).text().contains("no number to compare"));
+    }
+}

@@ -1,0 +1,105 @@
+//! Rows of published and simulated numbers as tables for people.
+
+use maud::{Markup, html};
+
+use super::Row;
+
+const HEADS: [&str; 6] = ["case", "quantity", "unit", "published", "simulated", "ours"];
+
+/// The rows as plain text.
+pub fn plain(rows: &[Row]) -> String {
+    let longest = |of: fn(&Row) -> &str, least: usize| {
+        rows.iter().map(|row| of(row).chars().count()).max().unwrap_or(0).max(least)
+    };
+    let case_width = longest(|row| &row.case, 4);
+    let quantity_width = longest(|row| row.quantity, 8);
+    let unit_width = longest(|row| row.unit, 4);
+    let line = |cells: [&str; 6]| {
+        let [case, quantity, unit, published, simulated, ours] = cells;
+        format!(
+            "{case:case_width$}  {quantity:quantity_width$}  {unit:unit_width$} {published:>9} \
+             {simulated:>9} {ours:>9}\n"
+        )
+    };
+    let mut text = line(HEADS);
+    for row in rows {
+        let [published, simulated, ours] = [row.published, row.simulated, row.ours].map(number);
+        text += &line([&row.case, row.quantity, row.unit, &published, &simulated, &ours]);
+    }
+    text
+}
+
+/// The rows on a page.
+pub fn markup(rows: &[Row]) -> Markup {
+    html! {
+        table {
+            thead { tr {
+                @for head in &HEADS[..3] { th { (head) } }
+                @for head in &HEADS[3..] { th.number { (head) } }
+            } }
+            tbody { @for row in rows { tr {
+                td { (row.case) }
+                td { (row.quantity) }
+                td { (row.unit) }
+                @for value in [row.published, row.simulated, row.ours] {
+                    td.number { (number(value)) }
+                }
+            } } }
+        }
+    }
+}
+
+/// Digits that a reader compares: one after the point from 20 on, two below,
+/// three significant ones where two would leave little.
+pub fn number(value: Option<f64>) -> String {
+    value.map_or("–".to_owned(), |value| {
+        let size = value.abs();
+        let text = match size {
+            _ if size >= 20.0 => format!("{value:.1}"),
+            _ if !(1e-12..0.2).contains(&size) => format!("{value:.2}"),
+            _ if size >= 0.002 => format!("{value:.4}"),
+            _ => format!("{value:.1e}"),
+        };
+        if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
+            text.trim_start_matches('-').to_owned()
+        } else {
+            text
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::studies::reproduce::table::*;
+
+    #[test]
+    fn nothing_is_not_less_than_nothing() {
+        assert_eq!(number(Some(-1e-13)), "0.00");
+        assert_eq!(number(Some(-0.01)), "-0.0100");
+        assert_eq!(number(None), "–");
+    }
+
+    #[test]
+    fn small_numbers_keep_digits_that_can_be_compared() {
+        assert_eq!(number(Some(0.0153)), "0.0153");
+        assert_eq!(number(Some(2e-6)), "2.0e-6");
+        assert_eq!(number(Some(96.63)), "96.6");
+    }
+
+    #[test]
+    fn columns_are_as_wide_as_what_stands_in_them() {
+        let quantity = "a quantity with a name of some length";
+        let row = |case: &str, quantity| Row {
+            seed: "ma2026",
+            case: case.into(),
+            quantity,
+            unit: "mm",
+            published: Some(1.3),
+            simulated: Some(1.46),
+            ours: None,
+        };
+        let text = plain(&[row("a", quantity), row("a longer case", "short")]);
+        let ends: Vec<usize> = text.lines().map(|line| line.chars().count()).collect();
+        assert!(ends.iter().all(|end| *end == ends[0]), "{text}");
+    }
+}

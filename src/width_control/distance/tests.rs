@@ -1,0 +1,283 @@
+//! The law on a bead whose truth is known.
+
+use crate::sim::hash;
+use crate::width_control::distance::*;
+
+/// A robot that does at once what it is told, and a bead of a power of its
+/// speed times a flow.
+struct Line {
+    law: ByDistance,
+    /// What the frames between two places show in place of the bead.
+    glare: Option<(f64, f64, f64)>,
+    now_s: f64,
+    path: f64,
+    speed: f64,
+    /// Path and width, every 2 mm or so.
+    laid: Vec<(f64, f64)>,
+    frame: u64,
+}
+
+const TARGET: f64 = 42.0;
+const OFFSET: f64 = 88.4;
+const GAUGE: f64 = 12.7;
+const STEP_S: f64 = 0.02;
+
+fn settings() -> DistanceSettings {
+    DistanceSettings {
+        offset: Mm::constant(OFFSET),
+        offset_sigma: Mm::constant(0.1 * OFFSET),
+        gauge: Mm::constant(GAUGE),
+        reference_speed: MmPerS::constant(112.5),
+        exponent: 0.25,
+        learns_exponent: true,
+        drift_per_root_m: 0.0055,
+    }
+}
+
+impl Line {
+    fn new(settings: DistanceSettings) -> Self {
+        let law = ByDistance::new(settings);
+        let (now_s, path, speed, frame) = (0.0, 0.0, 112.5, 0);
+        Self { law, glare: None, now_s, path, speed, laid: Vec::new(), frame }
+    }
+
+    /// One frame's time: lay, report, see, and command from 200 mm on.
+    fn step(
+        &mut self,
+        exponent: f64,
+        flow: impl Fn(f64) -> f64,
+        noise: f64,
+    ) -> Option<DistanceTrace> {
+        let width = |at: f64| 38.61 * (self.speed / 112.5).powf(-exponent) * flow(at);
+        self.laid.push((self.path, width(self.path)));
+        self.path += self.speed * STEP_S;
+        self.now_s += STEP_S;
+        let (path, speed) = (Mm::new(self.path).unwrap(), MmPerS::new(self.speed).unwrap());
+        self.law.reported(Stamp::from_secs(self.now_s), path, speed, 1.0);
+        let seen = self.seen();
+        let trace = seen.map(|seen| {
+            self.frame += 1;
+            let [random, _] = hash::normal_pair(hash::mix(&[3, self.frame]));
+            let glares = self.glare.filter(|(from, to, _)| (*from..*to).contains(&self.path));
+            let seen = glares.map_or(seen, |(_, _, width)| width);
+            let (width, sigma) = (Mm::new(seen + noise * random), Mm::new(noise));
+            self.law.measured(path, (width.unwrap(), sigma.unwrap()), Mm::constant(TARGET))
+        });
+        let (now, target) = (Stamp::from_secs(self.now_s), Mm::constant(TARGET));
+        if self.path >= 200.0
+            && let Some(speed) = self.law.speed(target, now, Span::from_secs(STEP_S))
+        {
+            self.speed = speed.get().clamp(60.0, 150.0);
+            self.law.steers(path);
+        }
+        trace
+    }
+
+    /// Mean width under the gauge.
+    fn seen(&self) -> Option<f64> {
+        let middle = self.path - OFFSET;
+        let within = |at: f64| (at - middle).abs() <= 0.5 * GAUGE;
+        if middle < GAUGE {
+            return None;
+        }
+        let widths: Vec<f64> =
+            self.laid.iter().filter(|(at, _)| within(*at)).map(|(_, w)| *w).collect();
+        let mut sum = 0.0;
+        for width in &widths {
+            sum += width;
+        }
+        (!widths.is_empty()).then(|| sum / f64::from(u32::try_from(widths.len()).unwrap()))
+    }
+
+    fn error(&self) -> f64 {
+        self.laid.last().unwrap().1 - TARGET
+    }
+}
+
+#[test]
+fn the_first_speed_is_right_to_the_exponent_and_what_is_left_goes_when_it_is_seen() {
+    let mut line = Line::new(settings());
+    while line.path < 230.0 {
+        let _ = line.step(0.22, |_| 1.0, 0.0);
+    }
+    assert!(line.error().abs() < 0.6, "{}", line.error());
+    while line.path < 380.0 {
+        let _ = line.step(0.22, |_| 1.0, 0.0);
+    }
+    assert!(line.error().abs() < 0.05, "{}", line.error());
+}
+
+#[test]
+fn a_step_of_the_flow_is_told_from_an_outlier_and_answered() {
+    let mut line = Line::new(settings());
+    let flow = |at: f64| if at > 900.0 { 1.08 } else { 1.0 };
+    let mut seen = Vec::new();
+    while line.path < 900.0 + OFFSET + 25.0 {
+        seen.extend(line.step(0.25, flow, 0.36).map(|trace| trace.use_of_width));
+    }
+    assert!(seen.contains(&Use::Change), "{seen:?}");
+    assert!(line.error().abs() < 0.6, "{}", line.error());
+}
+
+#[test]
+fn a_bead_that_does_not_answer_the_speed_contradicts_the_model() {
+    let mut line = Line::new(settings());
+    let flow = |at: f64| if at > 600.0 { 1.05 } else { 1.0 };
+    let mut found = None;
+    while line.path < 2500.0 {
+        let _ = line.step(0.0, flow, 0.36);
+        found = found.or(line.law.distrust());
+    }
+    assert_eq!(found, Some(Distrust::ModelContradicted));
+}
+
+#[test]
+fn a_model_that_holds_is_never_contradicted() {
+    for exponent in [0.2, 0.25, 0.35] {
+        let mut line = Line::new(settings());
+        let flow = |at: f64| if (700.0..1400.0).contains(&at) { 0.95 } else { 1.0 };
+        while line.path < 3000.0 {
+            let _ = line.step(exponent, flow, 0.36);
+            assert_eq!(line.law.distrust(), None, "at {} mm", line.path);
+        }
+    }
+}
+
+#[test]
+fn another_bead_begins_with_what_was_learnt() {
+    let mut line = Line::new(settings());
+    while line.path < 900.0 {
+        let _ = line.step(0.22, |_| 1.0, 0.36);
+    }
+    let mut next = Line::new(settings());
+    next.law = line.law.clone();
+    next.law.begin_bead();
+    let now = Stamp::from_secs(20.0);
+    let speed = next.law.speed(Mm::constant(TARGET), now, Span::from_secs(0.2)).unwrap();
+    let width = 38.61 * (speed.get() / 112.5).powf(-0.22);
+    assert!((width - TARGET).abs() < 0.3, "{width}");
+}
+
+#[test]
+fn nothing_seen_is_no_speed_and_a_width_without_a_path_is_no_reason() {
+    let mut law = ByDistance::new(settings());
+    let (now, span) = (Stamp::START, Span::from_secs(0.2));
+    assert_eq!(law.speed(Mm::constant(TARGET), now, span), None);
+    let trace = law.measured(
+        Mm::constant(100.0),
+        (Mm::constant(40.0), Mm::constant(0.3)),
+        Mm::constant(42.0),
+    );
+    assert_eq!(trace.use_of_width, Use::NotPaired);
+    assert!(!law.is_ready());
+}
+
+#[test]
+fn a_change_that_was_a_glare_is_undone_by_the_first_widths_after_it() {
+    let mut line = Line::new(settings());
+    line.glare = Some((900.0, 912.0, 47.0));
+    let mut seen = Vec::new();
+    while line.path < 990.0 {
+        let found = line.step(0.25, |_| 1.0, 0.36);
+        seen.extend(found.filter(|_| line.path > 900.0).map(|trace| trace.use_of_width));
+    }
+    assert!(seen.contains(&Use::Change), "{seen:?}");
+    assert!(line.error().abs() < 0.4, "{}", line.error());
+    // What was laid while it was believed is little.
+    let off = |(at, width): &&(f64, f64)| *at > 600.0 && (width - TARGET).abs() > 0.6;
+    let off = line.laid.iter().filter(off).count();
+    assert!(off < 12, "{off} frames");
+}
+
+#[test]
+fn a_width_that_was_laid_while_the_flow_was_changed_far_says_nothing() {
+    let mut law = ByDistance::new(settings());
+    let mut uses = Vec::new();
+    for k in 0..200_u32 {
+        let at = f64::from(k) * STEP_S;
+        // A flow that comes up within a second, and no plan that knows it exactly.
+        let share = (at / 2.0).clamp(0.1, 1.0);
+        let path = Mm::new(100.0 * at).unwrap();
+        law.reported(Stamp::from_secs(at), path, MmPerS::constant(100.0), share);
+        let width = (Mm::constant(30.0), Mm::constant(0.3));
+        uses.push(law.measured(path, width, Mm::constant(TARGET)).use_of_width);
+    }
+    let bead_at = |path: f64| (path + OFFSET) / (100.0 * STEP_S);
+    let (early, late) = (bead_at(100.0), bead_at(260.0));
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "frames")]
+    let at = |frame: f64| uses[frame as usize];
+    assert_eq!(at(early), Use::NotPaired);
+    assert_ne!(at(late), Use::NotPaired);
+}
+
+#[test]
+fn the_law_is_the_same_for_a_bead_of_any_width() {
+    let driven = |at: f64| if at.rem_euclid(400.0) < 200.0 { 100.0 } else { 110.0 };
+    for times in [0.05, 1.0, 6.0] {
+        let mut law =
+            ByDistance::new(DistanceSettings { offset_sigma: Mm::constant(0.5), ..settings() });
+        let mut seen = Vec::new();
+        let mut path = 0.0;
+        for k in 0..600_u32 {
+            // Told apart by 10 % of the speed every 200 mm.
+            let speed = driven(path);
+            path += speed * STEP_S;
+            let now = Stamp::from_secs(STEP_S * f64::from(k + 1));
+            law.reported(now, Mm::constant(path), MmPerS::constant(speed), 1.0);
+            let place = path - OFFSET;
+            let laid = driven(place);
+            // Widths of bead laid at two speeds are not what this is about.
+            let near = (place - GAUGE).div_euclid(200.0) != (place + GAUGE).div_euclid(200.0);
+            if place < GAUGE || near {
+                continue;
+            }
+            let [random, _] = hash::normal_pair(hash::mix(&[5, u64::from(k)]));
+            let width = times * 40.0 * (f64::powf(laid / 112.5, -0.25) + 0.009 * random);
+            let (width, sigma) = (Mm::constant(width), Mm::constant(times * 40.0 * 0.009));
+            let trace = law.measured(Mm::constant(path), (width, sigma), width);
+            assert!(law.is_ready());
+            seen.push((trace.use_of_width, trace.level_mm.get() / times));
+        }
+        assert!(seen.iter().all(|(taken, _)| *taken != Use::Change), "{times}: {seen:?}");
+        let last = seen.last().unwrap().1;
+        assert!((last - 40.0).abs() < 0.3, "{times}: {last}");
+    }
+}
+
+#[test]
+fn a_bead_that_is_never_paired_with_a_speed_is_told() {
+    // The gauge reaches beyond the nozzle.
+    let near = DistanceSettings { offset: Mm::constant(5.0), ..settings() };
+    let mut line = Line::new(near);
+    while line.path < OFFSET + 60.0 {
+        let _ = line.step(0.25, |_| 1.0, 0.36);
+    }
+    assert_eq!(line.law.distrust(), None);
+    while line.path < OFFSET + 120.0 {
+        let _ = line.step(0.25, |_| 1.0, 0.36);
+    }
+    assert_eq!(line.law.distrust(), Some(Distrust::Unpaired));
+    line.law.begin_bead();
+    assert_eq!(line.law.distrust(), None);
+}
+
+#[test]
+fn a_speed_that_is_not_reported_exactly_teaches_no_exponent() {
+    let mut law = ByDistance::new(settings());
+    let mut path = 0.0;
+    for k in 0..800_u32 {
+        // Half a percent of noise on the reports, milliseconds on their arrival, and widths
+        // that are exact.
+        let [speed, late] = hash::normal_pair(hash::mix(&[7, u64::from(k)]));
+        path += 112.5 * STEP_S;
+        let at = Stamp::from_secs(STEP_S * f64::from(k + 1) + 1e-3 * late.abs().min(5.0));
+        let reported = MmPerS::constant(112.5 * (1.0 + 0.005 * speed));
+        law.reported(at, Mm::constant(path), reported, 1.0);
+        if path > OFFSET + GAUGE {
+            let exact = (Mm::constant(38.61), Mm::constant(0.002));
+            let trace = law.measured(Mm::constant(path), exact, exact.0);
+            assert!((trace.exponent - 0.25).abs() < 0.01, "{k}: {trace:?}");
+            assert!((trace.offset_mm.get() - OFFSET).abs() < 0.05 * OFFSET, "{k}: {trace:?}");
+        }
+    }
+}

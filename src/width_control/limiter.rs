@@ -1,0 +1,88 @@
+//! Keeps setpoints within the cell's range and slew, and says which limit
+//! acted.
+
+use super::step::Limit;
+use crate::core::time::Span;
+use crate::core::units::{MmPerS, MmPerS2};
+
+/// What a setpoint may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Slowest setpoint.
+    pub min_speed: MmPerS,
+    /// Fastest setpoint.
+    pub max_speed: MmPerS,
+    /// Fastest change of setpoints.
+    pub max_accel: MmPerS2,
+}
+
+/// A setpoint that keeps the limits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limited {
+    /// The setpoint.
+    pub speed: MmPerS,
+    /// The limit that shaped it.
+    pub limit: Limit,
+}
+
+impl Limits {
+    /// The setpoint nearest to a demand that keeps the limits, `dt` after the
+    /// last one. Range goes before slew: a last setpoint outside the range is
+    /// left at once.
+    pub fn apply(&self, demand: MmPerS, last: MmPerS, dt: Span) -> Limited {
+        let (ranged, range_limit) = if demand < self.min_speed {
+            (self.min_speed, Limit::MinSpeed)
+        } else if demand > self.max_speed {
+            (self.max_speed, Limit::MaxSpeed)
+        } else {
+            (demand, Limit::None)
+        };
+        let last = last.max(self.min_speed).min(self.max_speed);
+        let reach = self.max_accel * dt.max(Span::ZERO);
+        if ranged > last + reach {
+            Limited { speed: last + reach, limit: Limit::Acceleration }
+        } else if ranged < last - reach {
+            Limited { speed: last - reach, limit: Limit::Deceleration }
+        } else {
+            Limited { speed: ranged, limit: range_limit }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::width_control::limiter::*;
+    use proptest::prelude::*;
+
+    const LIMITS: Limits = Limits {
+        min_speed: MmPerS::constant(60.0),
+        max_speed: MmPerS::constant(150.0),
+        max_accel: MmPerS2::constant(100.0),
+    };
+
+    fn apply(demand: f64, last: f64, dt_s: f64) -> (f64, Limit) {
+        let limited =
+            LIMITS.apply(MmPerS::constant(demand), MmPerS::constant(last), Span::from_secs(dt_s));
+        (limited.speed.get(), limited.limit)
+    }
+
+    #[test]
+    fn the_limit_that_acted_is_named() {
+        assert_eq!(apply(100.0, 100.0, 0.2), (100.0, Limit::None));
+        assert_eq!(apply(20.0, 61.0, 0.2), (60.0, Limit::MinSpeed));
+        assert_eq!(apply(500.0, 149.0, 0.2), (150.0, Limit::MaxSpeed));
+        assert_eq!(apply(140.0, 100.0, 0.2), (120.0, Limit::Acceleration));
+        assert_eq!(apply(70.0, 100.0, 0.2), (80.0, Limit::Deceleration));
+    }
+
+    proptest! {
+        #[test]
+        fn no_demand_leaves_the_range_or_the_slew(
+            demand in -1e6..1e6, last in 60.0..150.0, dt_s in 0.0..1.0,
+        ) {
+            let (speed, _) = apply(demand, last, dt_s);
+            prop_assert!((60.0..=150.0).contains(&speed));
+            prop_assert!((speed - last).abs() <= 100.0 * dt_s + 1e-6);
+        }
+    }
+}

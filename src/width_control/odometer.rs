@@ -1,0 +1,105 @@
+//! The nozzle's path where a robot reports none: its speed, added up.
+
+use super::event::RobotState;
+use crate::core::time::Stamp;
+use crate::core::units::Mm;
+
+/// Way by the speed over which a path that stands is believed.
+const BELIEVED: Mm = Mm::constant(20.0);
+
+/// Watches whether the path that a robot reports goes on with its speed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Odometer {
+    last: Option<(Stamp, RobotState)>,
+    /// Way by the speed since the reported path last changed.
+    unseen: Mm,
+    /// Whether the robot reports no path.
+    blind: bool,
+    /// What is added to the reported path.
+    added: Mm,
+}
+
+impl Odometer {
+    /// The report as it should be: with a path that goes on with the speed
+    /// where the robot's stands although it moves.
+    pub fn correct(&mut self, now: Stamp, state: &RobotState) -> RobotState {
+        let falls = self.last.is_some_and(|(_, last)| state.path_mm < last.path_mm);
+        if falls || !state.mode.lays_bead() {
+            *self = Self::default();
+        }
+        if !state.mode.lays_bead() {
+            return *state;
+        }
+        if let Some((at, last)) = self.last {
+            let way = last.speed_mm_per_s * (now - at);
+            if state.path_mm == last.path_mm {
+                self.unseen = self.unseen + way.max(Mm::ZERO);
+            } else if !self.blind {
+                self.unseen = Mm::ZERO;
+            }
+            if self.blind {
+                // A path that begins to grow late grows beside the speed's.
+                self.added = self.added + way - (state.path_mm - last.path_mm);
+            } else if self.unseen > BELIEVED {
+                self.blind = true;
+                self.added = self.unseen;
+            }
+        }
+        self.last = Some((now, *state));
+        RobotState { path_mm: state.path_mm + self.added, ..*state }
+    }
+
+    /// Whether the robot moves without reporting a path.
+    pub const fn is_blind(&self) -> bool {
+        self.blind
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::core::units::MmPerS;
+    use crate::width_control::RobotMode;
+    use crate::width_control::odometer::*;
+
+    fn report(path: f64, mode: RobotMode) -> RobotState {
+        RobotState {
+            t_ms: 0,
+            seq: 1,
+            mode,
+            speed_mm_per_s: MmPerS::constant(100.0),
+            path_mm: Mm::constant(path),
+            z_mm: Mm::ZERO,
+        }
+    }
+
+    #[test]
+    fn a_path_that_is_reported_stays_as_it_is() {
+        let mut odometer = Odometer::default();
+        for k in 0..50 {
+            let at = 0.1 * f64::from(k);
+            let state = report(100.0 * at, RobotMode::Print);
+            assert_eq!(odometer.correct(Stamp::from_secs(at), &state), state);
+        }
+        assert!(!odometer.is_blind());
+    }
+
+    #[test]
+    fn where_none_is_reported_the_speed_makes_one() {
+        let mut odometer = Odometer::default();
+        let mut path = 0.0;
+        for k in 0..50 {
+            let now = Stamp::from_secs(0.1 * f64::from(k));
+            path = odometer.correct(now, &report(7.0, RobotMode::Print)).path_mm.get();
+        }
+        assert!(odometer.is_blind());
+        assert!((path - (7.0 + 490.0)).abs() < 1e-6, "{path}");
+        // One that begins to count late, or anew, counts once.
+        let late = odometer.correct(Stamp::from_secs(5.0), &report(17.0, RobotMode::Print));
+        assert!((late.path_mm.get() - (path + 10.0)).abs() < 1e-6, "{late:?}");
+        let anew = odometer.correct(Stamp::from_secs(5.1), &report(1.0, RobotMode::Print));
+        assert_eq!(anew.path_mm.get(), 1.0);
+        let idle = odometer.correct(Stamp::from_secs(6.0), &report(7.0, RobotMode::Idle));
+        assert_eq!(idle.path_mm.get(), 7.0);
+        assert!(!odometer.is_blind());
+    }
+}

@@ -1,0 +1,101 @@
+//! Where along the path the nozzle was at a moment, from what the robot
+//! reported. What the camera sees now was laid when the nozzle was the
+//! camera's offset further back, whatever the speed has been since.
+
+use std::collections::VecDeque;
+
+use super::event::RobotState;
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm, MmPerS};
+
+/// Reports that are kept: more than three seconds at the fastest rate.
+const KEPT: usize = 160;
+/// Longest extrapolation beyond the newest report; the link counts as lost
+/// after this time.
+const FARTHEST: Span = Span::from_millis(500);
+
+/// The nozzle's path over time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Transport {
+    reports: VecDeque<Report>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Report {
+    at: Stamp,
+    path: Mm,
+    speed: MmPerS,
+}
+
+impl Default for Transport {
+    fn default() -> Self {
+        Self { reports: VecDeque::with_capacity(KEPT) }
+    }
+}
+
+impl Transport {
+    /// Takes a report that arrived at a moment. A path that falls belongs to
+    /// a new bead, and the old one is forgotten.
+    pub fn observe(&mut self, at: Stamp, state: &RobotState) {
+        if self.reports.back().is_some_and(|last| state.path_mm < last.path || at <= last.at) {
+            self.reports.clear();
+        }
+        if self.reports.len() == KEPT {
+            self.reports.pop_front();
+        }
+        self.reports.push_back(Report { at, path: state.path_mm, speed: state.speed_mm_per_s });
+    }
+
+    /// Distance of the nozzle along the path at a moment: between two reports
+    /// on the line between them, after the newest at its speed. `None` before
+    /// the oldest and too long after the newest.
+    pub fn path_at(&self, at: Stamp) -> Option<Mm> {
+        let newest = self.reports.back()?;
+        if at >= newest.at {
+            let beyond = at - newest.at;
+            return (beyond <= FARTHEST).then(|| newest.path + newest.speed * beyond);
+        }
+        let after = self.reports.partition_point(|report| report.at <= at);
+        let before = self.reports.get(after.checked_sub(1)?)?;
+        let after = self.reports.get(after)?;
+        let share = (at - before.at).secs() / (after.at - before.at).secs();
+        Some(before.path + (after.path - before.path) * share)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::width_control::RobotMode;
+    use crate::width_control::transport::*;
+
+    fn report(path: f64, speed: f64) -> RobotState {
+        RobotState {
+            t_ms: 0,
+            seq: 0,
+            mode: RobotMode::Print,
+            speed_mm_per_s: MmPerS::constant(speed),
+            path_mm: Mm::constant(path),
+            z_mm: Mm::ZERO,
+        }
+    }
+
+    #[test]
+    fn between_reports_the_path_is_a_line_and_after_them_it_goes_on() {
+        let mut transport = Transport::default();
+        transport.observe(Stamp::from_secs(1.0), &report(100.0, 50.0));
+        transport.observe(Stamp::from_secs(1.2), &report(120.0, 60.0));
+        let path = |secs| transport.path_at(Stamp::from_secs(secs)).map(Mm::get);
+        assert_eq!(path(0.9), None);
+        assert!((path(1.05).unwrap() - 105.0).abs() < 1e-9);
+        assert!((path(1.3).unwrap() - 126.0).abs() < 1e-9);
+        assert_eq!(path(1.8), None);
+    }
+
+    #[test]
+    fn a_new_bead_forgets_the_old() {
+        let mut transport = Transport::default();
+        transport.observe(Stamp::from_secs(1.0), &report(1900.0, 50.0));
+        transport.observe(Stamp::from_secs(1.1), &report(0.0, 50.0));
+        assert_eq!(transport.path_at(Stamp::from_secs(1.05)), None);
+    }
+}
