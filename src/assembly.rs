@@ -12,7 +12,6 @@ use std::path::{Path, PathBuf};
 
 use crate::calibration::{Calibration, SurfaceMap};
 use crate::cell::Cell;
-use crate::cell::control::WidthLaw;
 use crate::cell::file::{CalibrationSource, ExtruderPart, Purpose};
 use crate::core::units::Mm;
 use crate::extruder::ExtruderSetup;
@@ -20,6 +19,7 @@ use crate::io::calibration_file;
 use crate::io::record::ExtruderFile;
 use crate::sim::cell::Rig;
 use crate::sim::extruder::SimExtruder;
+use crate::width_control::settings::WidthLaw;
 
 /// The extruder side of a cell that is commanded.
 #[derive(Debug, Clone)]

@@ -2,6 +2,7 @@
 //! each with its line.
 
 pub mod control;
+mod controller;
 pub mod extruder;
 pub mod file;
 

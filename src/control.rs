@@ -11,34 +11,32 @@
 
 mod by_distance;
 mod by_steps;
+pub mod event;
 mod extrude;
 mod planned;
 mod robot;
+pub mod step;
 mod track;
+
+pub use event::Event;
+pub use step::{Command, ExtruderStep, Fault, Hold, State, Step, Trace};
 
 use extrude::ExtruderSide;
 use planned::UNPACED;
 
-use crate::calibration::Calibration;
-use crate::cell::Cell;
-use crate::cell::control::{Control, WidthLaw};
-use crate::cell::file::RunPart;
 use crate::core::readback::{Follow, Verdict};
+use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
 use crate::extruder::{ExtruderSetup, FlowDemand, Supervisor};
 use crate::width_control::distance::{ByDistance, DistanceSettings, Distrust};
+use crate::width_control::limiter::Limit;
 use crate::width_control::limiter::Limits;
 use crate::width_control::odometer::Odometer;
 use crate::width_control::pi::{Pi, PiGains};
+use crate::width_control::settings::Control;
 use crate::width_control::steps::{StepSettings, Steps};
 use crate::width_control::transport::Transport;
-use crate::width_control::{
-    Command, Event, Fault, Hold, Limit, RobotMode, RobotState, State, Step, Trace,
-};
-
-/// How long a robot holds before it stops, by its link's protocol.
-const HOLD_TIME: Span = Span::from_millis(1000);
 
 /// Everything the controller has to know of its cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,35 +64,6 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// As a cell describes it, with the calibration that says how long the
-    /// gauge is.
-    pub fn of(cell: &Cell, run: &RunPart, calibration: &Calibration) -> Self {
-        let distance = match run.control.law {
-            WidthLaw::Pi | WidthLaw::Steps(_) => None,
-            WidthLaw::Distance(exponent) => Some(DistanceSettings {
-                offset: run.camera.offset,
-                offset_sigma: run.camera.offset_sigma,
-                gauge: cell.gauge_length(calibration),
-                reference_speed: run.robot.start_speed,
-                exponent: exponent.value,
-                learns_exponent: exponent.learns,
-                drift_per_root_m: exponent.drift_per_root_m,
-            }),
-        };
-        Self {
-            control: run.control.clone(),
-            limits: run.limits,
-            start_speed: run.robot.start_speed,
-            start_length: run.robot.start_length,
-            bead_length: run.robot.bead_length,
-            camera_offset: run.camera.offset,
-            alone_for: Span::from_millis(i64::from(run.robot.valid_ms)) + HOLD_TIME,
-            setpoint_period: Span::from_secs(1.0 / run.robot.rate_hz),
-            distance,
-            steps: cell.steps(run, calibration),
-        }
-    }
-
     /// Gains of the PI law: those of the cell or, where it gives none because
     /// the law is only fallen back to, an integral that the dead time from
     /// nozzle to camera allows for the bead that the law by distance was told

@@ -4,5 +4,6 @@ pub mod frame;
 pub mod geometry;
 pub mod quantity;
 pub mod readback;
+pub mod robot;
 pub mod time;
 pub mod units;

@@ -30,7 +30,7 @@ use crate::calibration::Calibration;
 use crate::cell::Cell;
 use crate::cell::extruder::ExtruderLink;
 use crate::cell::file::{RunPart, Source};
-use crate::control::{Controller, Setup};
+use crate::control::Controller;
 use crate::core::time::Span;
 use crate::drivers::camera::open;
 use crate::drivers::camera::rendered::{RenderedCamera, RobotView};
@@ -168,7 +168,7 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         .extruder
         .as_ref()
         .map(|side| ExtruderWatch::new(side.config(), side.setup.feedforward_period));
-    let mut controller = Controller::new(Setup::of(&live.cell, &live.run, &live.calibration));
+    let mut controller = Controller::new(live.cell.controller(&live.run, &live.calibration));
     if let Some(side) = live.extruder {
         controller = controller.with_extruder(side.setup, side.demand);
     }

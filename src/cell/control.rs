@@ -5,6 +5,7 @@ use crate::core::units::{Mm, MmPerS, MmPerS2};
 use crate::document::Table;
 use crate::width_control::limiter::Limits;
 use crate::width_control::pi::PiGains;
+use crate::width_control::settings::{Control, Exponent, WidthLaw};
 use crate::width_control::target::{Knot, Layers, Target};
 
 /// Fastest that any robot of this kind moves, as a bound on typing errors.
@@ -22,46 +23,6 @@ pub const STEP_SHARES: std::ops::RangeInclusive<f64> = 0.02..=0.3;
 /// Keys of the PI law's gains, and what they may be.
 const GAINS: [&str; 2] = ["kp_per_s", "ki_per_s2"];
 const ANY_GAIN: std::ops::RangeInclusive<f64> = 0.0..=1e4;
-
-/// How the width is held.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum WidthLaw {
-    /// Proportional-integral, on the width that is seen.
-    Pi,
-    /// By distance, with the PI law to fall back to.
-    Distance(Exponent),
-    /// Not at all: the speed goes through a course of steps, each by this share of
-    /// the start speed.
-    Steps(f64),
-}
-
-/// What the law by distance is told of the bead.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Exponent {
-    /// b in w = A·(v/v₀)^−b.
-    pub value: f64,
-    /// Whether it is learnt from the data.
-    pub learns: bool,
-    /// How far the flow wanders along a metre, as a share.
-    pub drift_per_root_m: f64,
-}
-
-/// What the width controller is to do.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Control {
-    /// Width that is asked for.
-    pub target: Target,
-    /// How it is held.
-    pub law: WidthLaw,
-    /// Gains of the PI law, on the error in millimetres; none where it is only
-    /// fallen back to and the file gives none.
-    pub gains: Option<PiGains>,
-    /// Longest time between two widths over which the loop integrates; beyond
-    /// it holds.
-    pub max_gap: Span,
-    /// Longest hold before the controller gives up and stops the robot.
-    pub max_hold: Span,
-}
 
 /// `target_width_mm`, which stands alone in a cell that only measures.
 pub fn read_target(control: &Table<'_>) -> Option<Mm> {

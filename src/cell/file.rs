@@ -10,7 +10,6 @@ mod robot;
 use std::path::Path;
 
 use super::control;
-use super::control::{Control, WidthLaw};
 use super::extruder::Beside;
 use crate::calibration::{Calibration, SurfaceMap};
 use crate::core::frame::Channel;
@@ -21,6 +20,7 @@ use crate::scenario::table;
 use crate::scenario::table::{Level, Simulation};
 use crate::vision::Gauge;
 use crate::width_control::limiter::Limits;
+use crate::width_control::settings::{Control, WidthLaw};
 use crate::width_control::steps::StepSettings;
 use crate::width_control::target::Target;
 

@@ -13,11 +13,11 @@ use super::calibrate::check_writable;
 use crate::assembly::{ExtruderSide, LoadedCell, beyond, steady};
 use crate::calibration::Calibration;
 use crate::cell::Cell;
-use crate::cell::control::WidthLaw;
 use crate::cell::file::{Purpose, RunPart, Source};
 use crate::core::time::Span;
 use crate::core::units::Mm;
 use crate::extruder::start_stop::Pause;
+use crate::width_control::settings::WidthLaw;
 
 /// Ratio of speeds in one cell that nobody means.
 const UNLIKELY: f64 = 200.0;

@@ -12,11 +12,11 @@ use super::WrongArguments;
 use super::recorded::attached;
 use crate::assembly::extruder;
 use crate::cell::file::{ExtruderPart, Purpose};
-use crate::control::{Controller, Setup};
+use crate::control::Controller;
+use crate::control::step::Step;
 use crate::io::record::ExtruderFile;
 use crate::io::recording::{Entry, Recording};
 use crate::run::replay::{Difference, ReplayReport, replay};
-use crate::width_control::Step;
 
 /// Exit status of a replay that had to end before the recording did.
 const RECORDS_LOST: u8 = 3;
@@ -79,7 +79,7 @@ fn recorded_controller(recording: &Recording) -> anyhow::Result<Controller> {
         let what = format!("cell.toml in {file}: it lacks tables that a run needs");
         bail!(WrongArguments::new(what));
     };
-    let controller = Controller::new(Setup::of(&cell, &run, &calibration));
+    let controller = Controller::new(cell.controller(&run, &calibration));
     let Some(part) = &run.extruder else { return Ok(controller) };
     let files = recorded_files(recording, part)?;
     let cell = format!("cell.toml in {}", recording.file());

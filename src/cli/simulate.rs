@@ -11,6 +11,8 @@ use clap::Args;
 use super::{Voice, WITH_LOSS, outcome};
 use crate::assembly::LoadedCell;
 use crate::cell::file::{KeepFrames, Purpose};
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, Mm3PerS};
 use crate::io::progress::Progress;
@@ -23,7 +25,6 @@ use crate::rows::summary::Note;
 use crate::run::ports::{RecordError, Recorder};
 use crate::sim::cell::{LayerEnd, Sight, SimCell, Witness};
 use crate::width_control::target::Target;
-use crate::width_control::{Event, Step};
 
 /// Runs the closed loop on a simulated cell.
 #[derive(Debug, Args)]

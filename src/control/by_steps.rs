@@ -1,10 +1,10 @@
 //! The course of steps within the controller: when it begins, what speed it asks
 //! for, and when it ends.
 
+use super::step::{Hold, Trace};
 use super::{Controller, Phase, Steering};
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS};
-use crate::width_control::{Hold, Trace};
 
 impl Controller {
     /// Takes a width: the course begins with the first one of this bead behind the

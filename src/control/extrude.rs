@@ -3,11 +3,12 @@
 
 use std::sync::Arc;
 
+use super::event::Event;
+use super::step::ExtruderStep;
 use super::{Controller, Phase, Stretch};
 use crate::core::time::Stamp;
 use crate::extruder::trajectory::{Planned, PlannedJob};
 use crate::extruder::{ExtruderFault, ExtruderState, FlowDemand, Laying, Supervisor};
-use crate::width_control::{Event, ExtruderStep};
 
 /// The extruder side of a controller, where a cell has one.
 #[derive(Debug, Clone, PartialEq)]

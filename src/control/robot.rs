@@ -1,10 +1,12 @@
 //! What the robot reports: its mode, its path and how it follows its speed.
 
+use super::step::{Fault, Hold};
 use super::{Controller, Phase, Stretch};
 use crate::core::readback::Verdict;
+use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
-use crate::width_control::{Fault, Hold, Limit, RobotLimits, RobotMode, RobotState};
+use crate::width_control::limiter::Limit;
 
 /// Share of the setpoint at which a robot that starts has run up.
 const RUN_UP: f64 = 0.95;

@@ -4,10 +4,11 @@ mod distance;
 mod extruder;
 
 use crate::control::*;
+use crate::core::robot::RobotLimits;
 use crate::core::time::Span;
 use crate::core::units::MmPerS2;
-use crate::width_control::RobotLimits;
 use crate::width_control::pi::PiGains;
+use crate::width_control::settings::WidthLaw;
 use crate::width_control::target::Target;
 
 /// The cell of the 2022 paper.

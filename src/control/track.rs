@@ -1,12 +1,13 @@
 //! Widths: where the bead in a frame was laid, and what the laws make of it.
 
 use super::planned::UNPACED;
+use super::step::{Hold, Trace};
 use super::{Controller, Phase, Steering};
 use crate::core::readback::Verdict;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;
+use crate::width_control::limiter::Limit;
 use crate::width_control::pi::{Demand, Pi, Saturation};
-use crate::width_control::{Hold, Limit, Trace};
 
 /// Least share of its speed from which the speed of a robot that goes by the
 /// flow is taken for the law's: below, the robot's limits say more of it.

@@ -4,12 +4,14 @@
 use crossbeam_channel::Sender;
 
 use super::line::{Client, Dialect, Heard, LinkEvent, Open, Unsent};
+use crate::control::event::Event;
+use crate::control::step::Command;
+use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
 use crate::io::clock::RunClock;
 use crate::link::{LineError, MAX_VALID_MS, MIN_VALID_MS, PcLine, RobotLine, on_wire};
 use crate::run::ports::RobotPort;
-use crate::width_control::{Command, Event, RobotLimits, RobotMode, RobotState};
 
 pub use super::line::{LinkTiming, Written};
 

@@ -33,9 +33,9 @@ use profile::Profile;
 pub use study::{Seen, Study};
 use whiten::Noise;
 
+use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS};
-use crate::width_control::RobotState;
 
 /// Exponents b that a bead may have. The bead of Shojaei Barjuei et al. 2022 has 0.22 to
 /// 0.27, one whose mass alone counts has 1.

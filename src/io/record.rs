@@ -33,10 +33,11 @@ use std::time::Duration;
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 
 use crate::cell::file::KeepFrames;
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::frame::Frame;
 use crate::core::time::Stamp;
 use crate::run::ports::{RecordError, Recorder};
-use crate::width_control::{Event, Step};
 use encode::FrameJob;
 use format::{CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, FORMAT_VERSION, RunInfo};
 use mux::Mux;

@@ -1,14 +1,16 @@
 //! The columns that a recording holds of an extruder, a robot and a bead, for
 //! finding a model in them.
 
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::quantity::Unit;
+use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::core::units::{MPa, Mm, Mm3PerS, MmPerS, Rpm};
 use crate::extruder::demand::section;
 use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
 use crate::identify::series::Series;
 use crate::io::recording::{Entry, RecordingError};
-use crate::width_control::{Event, RobotState, Step};
 
 /// Name of the command's column, before its unit.
 pub const COMMAND: &str = "command";

@@ -22,8 +22,9 @@ use super::record::format::{
     CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, EVENT_TOPIC, EventRow, FORMAT_VERSION, IMAGE_TOPIC,
     RUN_METADATA, RunInfo, STEP_TOPIC, StepRow,
 };
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::time::Stamp;
-use crate::width_control::{Event, Step};
 
 /// Bytes that are read ahead.
 const BUFFER_BYTES: usize = 1 << 16;

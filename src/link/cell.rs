@@ -19,9 +19,9 @@
 use super::count::Count;
 use super::motion::{Drive, Motion, seconds};
 use super::{ErrCode, MAX_VALID_MS, ParamError, RobotLine, RobotParams};
+use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
-use crate::width_control::{RobotLimits, RobotMode, RobotState};
 
 mod take;
 #[cfg(test)]

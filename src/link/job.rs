@@ -2,9 +2,9 @@
 //! connected.
 
 use super::RobotCell;
+use crate::core::robot::RobotMode;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;
-use crate::width_control::RobotMode;
 
 /// Begins the beads of a [`RobotCell`]. A new connection stands for the
 /// operator's key: it begins the job again when it was finished, and

@@ -1,8 +1,8 @@
 //! What a robot is: its limits, how its speed follows, how long its beads are.
 
 use super::on_wire;
+use crate::core::robot::RobotLimits;
 use crate::core::units::{Mm, MmPerS, MmPerS2};
-use crate::width_control::RobotLimits;
 
 /// Description of a robot that speaks the link.
 #[derive(Debug, Clone, PartialEq)]

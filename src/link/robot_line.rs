@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::fields::{Fields, LineError, decimal, printing};
 use super::{MAX_LINE, VERSION};
-use crate::width_control::{RobotLimits, RobotMode, RobotState};
+use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 
 const KEYWORDS: &str = "HELLO, STATE or ERR";
 /// Longest name that still fits a line beside three numbers.

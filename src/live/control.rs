@@ -15,6 +15,9 @@ use crossbeam_channel::{Receiver, never, select};
 use super::eye::Seen;
 use super::latency::Latencies;
 use super::scribe::Scribe;
+use crate::control::event::Event;
+use crate::control::step::{Command, State, Step};
+use crate::core::robot::RobotMode;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::MmPerS;
 use crate::drivers::camera::rendered::RobotView;
@@ -27,7 +30,6 @@ use crate::rows::summary::Note;
 use crate::run::ports::RecordError;
 use crate::run::runner::{Handled, Runner};
 use crate::width_control::limiter::Limits;
-use crate::width_control::{Command, Event, RobotMode, State, Step};
 
 pub use extruder::ExtruderWatch;
 pub use robot::LinkPort;

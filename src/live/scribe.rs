@@ -8,6 +8,8 @@ use std::thread::{Builder, JoinHandle};
 use crossbeam_channel::{Receiver, Sender, unbounded};
 
 use super::latency::Latency;
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::frame::Frame;
 use crate::core::geometry::ImagePoint;
 use crate::core::time::Stamp;
@@ -16,7 +18,6 @@ use crate::rows::log::RunLog;
 use crate::rows::output::LogError;
 use crate::rows::summary::{Note, Summary};
 use crate::vision::Edges;
-use crate::width_control::{Event, Step};
 
 /// Pictures that may wait for the log; beyond, rows go without theirs.
 const WAITING_PICTURES: usize = 16;

@@ -1,10 +1,11 @@
 //! What a recording says of a bead: where the robot was, and the widths that were
 //! measured meanwhile.
 
+use crate::control::event::Event;
+use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::identify::camera_offset::Width;
 use crate::io::recording::{Entry, RecordingError};
-use crate::width_control::{Event, RobotState};
 
 /// A bead as it was recorded.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -10,18 +10,19 @@
 
 use std::path::Path;
 
+use crate::control::event::Event;
+use crate::control::step::{Command, Fault, Hold, State, Step, Trace};
 use crate::core::frame::{Frame, Pixels};
 use crate::core::geometry::{ImagePoint, Roi};
+use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS, MmPerS2};
 use crate::rows::frame_row::{ControlColumns, FrameRow, sample};
 use crate::rows::log::{ControlFacts, LogOptions, RunLog};
 use crate::rows::summary::{Note, Summary};
 use crate::vision::{Axis, Edges, Gauge, Polarity, WidthMeasurement};
+use crate::width_control::limiter::Limit;
 use crate::width_control::limiter::Limits;
-use crate::width_control::{
-    Command, Event, Fault, Hold, Limit, RobotMode, RobotState, State, Step, Trace,
-};
 
 const SIZE: (usize, usize) = (720, 540);
 const MM_PER_PX: f64 = 0.126_582;

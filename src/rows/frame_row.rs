@@ -1,8 +1,9 @@
 //! What is known of one frame once it has been looked at.
 
+use crate::control::step::Step;
 use crate::core::units::{Mm, MmPerS};
 use crate::vision::{Roughness, WidthMeasurement};
-use crate::width_control::{Limit, Step};
+use crate::width_control::limiter::Limit;
 
 /// One row of `widths.csv`.
 #[derive(Debug, Clone, Copy, PartialEq)]

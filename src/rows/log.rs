@@ -8,6 +8,8 @@ use super::output::{LogError, make_folder, write_whole};
 use super::summary::{Note, Summary, SummaryBuilder};
 use super::widths::WidthsWriter;
 use crate::cell::file::RunPart;
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::frame::Frame;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, Mm3PerS};
@@ -17,7 +19,6 @@ use crate::report::run::Report;
 use crate::report::run::charts::Charts;
 use crate::vision::{Edges, Gauge};
 use crate::width_control::limiter::Limits;
-use crate::width_control::{Event, Step};
 
 /// Most remarks that a report lists.
 const MAX_REMARKS: usize = 40;

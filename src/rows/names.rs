@@ -1,7 +1,8 @@
 //! Names of reasons as they stand in files, and as people read them.
 
+use crate::control::step::{Fault, Hold};
 use crate::extruder::{CommandLimit, ExtruderFault, ExtruderHold};
-use crate::width_control::{Fault, Hold, Limit};
+use crate::width_control::limiter::Limit;
 
 /// Name of a limit in `widths.csv` and `summary.json`.
 pub fn limit(limit: Limit) -> &'static str {

@@ -23,11 +23,12 @@ pub use profile::ProfileSummary;
 use super::frame_row::FrameRow;
 use super::output::{LogError, write_whole};
 use super::setup;
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, Mm3PerS};
 use crate::numeric::statistics::{Distribution, Moments, WeightedMean, as_f64};
 use crate::vision::Roughness;
-use crate::width_control::{Event, Step};
 
 /// What a run came to. What is not known is null.
 #[derive(Debug, Clone, PartialEq, Serialize)]

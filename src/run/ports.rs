@@ -1,10 +1,11 @@
 //! What the controller is plugged into. Every trait has at least a live and a
 //! simulated side.
 
+use crate::control::event::Event;
+use crate::control::step::{Command, Step};
 use crate::core::frame::Frame;
 use crate::core::time::Stamp;
 use crate::extruder::ExtruderCommand;
-use crate::width_control::{Command, Event, Step};
 
 /// Gives frames, one after the other.
 pub trait FrameSource: Send {

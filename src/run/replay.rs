@@ -1,9 +1,10 @@
 //! Feeds recorded events to a controller and compares its steps with the
 //! recorded ones, bit for bit.
 
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::io::recording::{Entry, RecordingError};
-use crate::width_control::{Event, Step};
 
 /// The first step that came out differently.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,9 +94,9 @@ fn same_bits(a: &Step, b: &Step) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use crate::control::step::{State, Trace};
     use crate::core::units::Mm;
     use crate::run::replay::*;
-    use crate::width_control::{State, Trace};
 
     /// A controller with memory: the error is the sum of what it has seen.
     fn controller() -> impl FnMut(Stamp, &Event) -> Step {

@@ -3,8 +3,9 @@
 
 use super::ports::{ExtruderPort, NoExtruder, RecordError, Recorder, RobotPort};
 use crate::control::Controller;
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::time::Stamp;
-use crate::width_control::{Event, Step};
 
 /// A controller with its robot, its recorder and its extruder.
 #[derive(Debug)]
@@ -98,8 +99,8 @@ impl Recorder for NoRecorder {
 
 #[cfg(test)]
 mod tests {
+    use crate::control::step::{Command, Hold, State};
     use crate::run::runner::*;
-    use crate::width_control::{Command, Hold, State};
 
     struct NoRobot;
 

@@ -11,14 +11,16 @@ mod witness;
 use crate::calibration::Calibration;
 use crate::cell::Cell;
 use crate::cell::file::RunPart;
-use crate::control::{Controller, Setup};
+use crate::control::Controller;
+use crate::control::event::Event;
+use crate::control::step::Command;
+use crate::core::robot::RobotMode;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, Mm3PerS, MmPerS, MmPerS2};
 use crate::extruder::{ExtruderSetup, ExtruderState, FlowDemand};
 use crate::link::{ParamError, RobotCell, RobotParams};
 use crate::run::ports::Recorder;
 use crate::run::runner::{Handled, Runner};
-use crate::width_control::{Command, Event, RobotMode};
 
 use super::extruder::SimExtruder;
 use super::hash;
@@ -151,7 +153,7 @@ impl<K: Recorder> SimCell<K> {
             ..RobotParams::default()
         };
         let port = SimPort::new(RobotCell::new(params, Stamp::START)?, run.robot.valid_ms);
-        let mut controller = Controller::new(Setup::of(cell, run, &calibration));
+        let mut controller = Controller::new(cell.controller(run, &calibration));
         let nominal_flow = extruder.as_ref().map(|rig| rig.nominal_flow);
         let mut plant = None;
         if let Some(rig) = extruder {

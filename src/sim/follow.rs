@@ -2,11 +2,11 @@
 
 use super::hash;
 use super::laid::LaidBead;
+use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;
 use crate::scenario::bead::{BeadModel, Roughness};
 use crate::scenario::disturbance::Flow;
-use crate::width_control::{RobotMode, RobotState};
 
 /// Longest stretch between two reports that is still taken for one bead
 /// \[mm\]: a robot that was connected in the middle of its bead, or was not

@@ -1,8 +1,10 @@
 //! Figures of a simulated layer.
 
 use super::cell::{Sight, Witness};
+use crate::control::event::Event;
+use crate::control::step::Step;
+use crate::core::robot::RobotMode;
 use crate::core::time::Stamp;
-use crate::width_control::{Event, RobotMode, Step};
 
 /// A place along the bead and a value there.
 pub type AlongBead = (f64, f64);

@@ -2,10 +2,12 @@
 
 use crate::calibration::Calibration;
 use crate::cell::file::{Cell, RunPart};
+use crate::control::event::Event;
+use crate::control::step::Step;
+use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::run::runner::NoRecorder;
-use crate::width_control::{Event, RobotState, Step};
 
 use super::cell::{Sight, SimCell, SimError, Witness};
 use super::score::{AlongBead, Score, mean};

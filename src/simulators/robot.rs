@@ -6,11 +6,11 @@ use std::net::{SocketAddr, TcpListener};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::server::Server;
+use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;
 use crate::io::clock::RunClock;
 use crate::link::{Faults, Job, ParamError, RobotCell, RobotParams};
-use crate::width_control::{RobotMode, RobotState};
 
 mod machine;
 

@@ -1,9 +1,9 @@
 //! Laws that are tried on a cell as it was found.
 
 use super::propose::{DistanceProposal, Proposal};
-use crate::cell::control::{Exponent, WidthLaw};
 use crate::cell::file::RunPart;
 use crate::width_control::pi::PiGains;
+use crate::width_control::settings::{Exponent, WidthLaw};
 
 /// A law that is tried.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,11 +1,13 @@
 //! What is taken of a run: reports, widths, setpoints, and how far a course of steps
 //! came.
 
+use crate::control::event::Event;
+use crate::control::step::{Command, Step};
+use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
 use crate::identify::camera_offset::Width;
 use crate::width_control::steps::{Progress, StepSettings, StepsTrace};
-use crate::width_control::{Command, Event, RobotState, Step};
 
 /// A run as it was recorded, in order.
 #[derive(Debug, Clone, Default, PartialEq)]

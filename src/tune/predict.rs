@@ -8,6 +8,8 @@ use super::plant::Plant;
 use crate::calibration::Calibration;
 use crate::cell::Cell;
 use crate::cell::file::{RunPart, Source};
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS2};
 use crate::run::runner::NoRecorder;
@@ -16,7 +18,6 @@ use crate::scenario::disturbance::Flow;
 use crate::scenario::table::{Level, Simulation};
 use crate::sim::cell::{Sight, SimCell, SimError, Witness};
 use crate::width_control::target::Target;
-use crate::width_control::{Event, Step};
 
 /// Step of the flow, as a share.
 pub const FLOW_STEP: f64 = 0.08;
@@ -198,7 +199,7 @@ impl Witness for Laid {
             self.speed.push((state.path_mm.get(), state.speed_mm_per_s.get()));
         }
         self.stopped |= step.state.name() == "fault";
-        let Some(crate::width_control::Command::Speed(speed)) = step.command else { return };
+        let Some(crate::control::step::Command::Speed(speed)) = step.command else { return };
         if step.state.name() != "tracking" {
             return;
         }

@@ -5,10 +5,10 @@ use serde::Serialize;
 use super::noise::Drift;
 use super::plant::Plant;
 use super::stability::{LoopMargins, LoopPlant};
-use crate::cell::control::WidthLaw;
 use crate::cell::file::RunPart;
 use crate::width_control::limiter::Limits;
 use crate::width_control::pi::PiGains;
+use crate::width_control::settings::WidthLaw;
 
 /// How far the flow is said to wander along a metre unless less is known; that of the
 /// law by distance.

@@ -12,6 +12,9 @@ use super::{Facts, Log, Plant, TuneError, robot};
 use crate::calibration::Calibration;
 use crate::cell::Cell;
 use crate::cell::file::Purpose;
+use crate::control::event::Event;
+use crate::control::step::Step;
+use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS};
 use crate::identify::camera_offset::OffsetError;
@@ -20,7 +23,6 @@ use crate::run::runner::NoRecorder;
 use crate::sim::cell::{Sight, SimCell, Witness};
 use crate::width_control::pi::PiGains;
 use crate::width_control::steps::Progress;
-use crate::width_control::{Event, RobotMode, RobotState, Step};
 
 const SCALE: Calibration = Calibration::Scale { mm_per_px: 0.126_582, sigma: None };
 

@@ -1,9 +1,31 @@
 //! Keeps setpoints within the cell's range and slew, and says which limit
 //! acted.
 
-use super::step::Limit;
+use serde::{Deserialize, Serialize};
+
 use crate::core::time::Span;
 use crate::core::units::{MmPerS, MmPerS2};
+
+/// Which limit acted on a setpoint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Limit {
+    /// None.
+    #[default]
+    None,
+    /// The slowest speed of the cell.
+    MinSpeed,
+    /// The fastest speed of the cell.
+    MaxSpeed,
+    /// The acceleration of the cell, while speeding up.
+    Acceleration,
+    /// The acceleration of the cell, while slowing down.
+    Deceleration,
+    /// The robot's own: it moves slower than it was told.
+    RobotSlower,
+    /// The robot's own: it moves faster than it was told.
+    RobotFaster,
+}
 
 /// What a setpoint may be.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,6 @@
 //! The nozzle's path where a robot reports none: its speed, added up.
 
-use super::event::RobotState;
+use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 
@@ -57,8 +57,8 @@ impl Odometer {
 
 #[cfg(test)]
 mod tests {
+    use crate::core::robot::RobotMode;
     use crate::core::units::MmPerS;
-    use crate::width_control::RobotMode;
     use crate::width_control::odometer::*;
 
     fn report(path: f64, mode: RobotMode) -> RobotState {

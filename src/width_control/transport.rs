@@ -4,7 +4,7 @@
 
 use std::collections::VecDeque;
 
-use super::event::RobotState;
+use crate::core::robot::RobotState;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
 
@@ -65,7 +65,7 @@ impl Transport {
 
 #[cfg(test)]
 mod tests {
-    use crate::width_control::RobotMode;
+    use crate::core::robot::RobotMode;
     use crate::width_control::transport::*;
 
     fn report(path: f64, speed: f64) -> RobotState {

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use truebead::control::step::Command;
+use truebead::core::robot::RobotMode;
 use truebead::core::time::Stamp;
 use truebead::drivers::robot::{
     LinkClient, LinkConfig, LinkConfigError, LinkTiming, NotSent, RobotEvent,
@@ -9,7 +11,6 @@ use truebead::drivers::robot::{
 use truebead::io::clock::RunClock;
 use truebead::link::{ErrCode, Faults};
 use truebead::run::ports::RobotPort;
-use truebead::width_control::{Command, RobotMode};
 
 use crate::support::{Pc, Talk, config, listener, sim, sim_on, speed};
 

@@ -1,7 +1,7 @@
 //! What the simulated robot does, spoken to by hand.
 
+use truebead::core::robot::RobotMode;
 use truebead::core::units::Mm;
-use truebead::width_control::RobotMode;
 
 use crate::support::{Talk, listener, sim, sim_on};
 

@@ -5,13 +5,13 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, unbounded};
+use truebead::core::robot::{RobotMode, RobotState};
 use truebead::core::time::Span;
 use truebead::core::units::{Mm, MmPerS};
 use truebead::drivers::robot::{LinkClient, LinkConfig, LinkTiming, RobotEvent};
 use truebead::io::clock::RunClock;
 use truebead::link::{Job, RobotParams};
 use truebead::simulators::robot::{RobotSim, SimOptions};
-use truebead::width_control::{RobotMode, RobotState};
 
 /// What should happen does so long before; only a failure waits for it.
 const PATIENCE: Duration = Duration::from_secs(20);

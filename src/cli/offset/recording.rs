@@ -9,13 +9,13 @@ use crate::assembly::LoadedCell;
 use crate::calibration::Calibration;
 use crate::cell::Cell;
 use crate::cell::file::Purpose;
+use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::identify::camera_offset::{EXPONENTS, Found, Search, find};
 use crate::io::recording::Recording;
 use crate::numeric::rank;
 use crate::report::offset::{Print, print};
-use crate::width_control::RobotState;
 
 /// Largest offset that is tried unless another is given.
 const FARTHEST: Mm = Mm::constant(1000.0);

@@ -12,6 +12,8 @@ use super::super::{Voice, outcome};
 use super::TuneArgs;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::io::clock::RunClock;
@@ -19,7 +21,6 @@ use crate::io::stop::StopSignal;
 use crate::rows::output;
 use crate::sim::cell::{Sight, SimCell, Witness};
 use crate::width_control::steps::{Progress, StepSettings};
-use crate::width_control::{Event, Step};
 
 /// Keys of `[control]` that only other laws know.
 pub const OF_DISTANCE: [&str; 3] = ["exponent", "exponent_learns", "drift_per_root_m"];

@@ -7,13 +7,13 @@ use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
 use super::fault;
 use crate::cell::{Camera, Mount};
+use crate::core::robot::RobotState;
 use crate::core::time::{Span, Stamp};
 use crate::io::clock::RunClock;
 use crate::run::ports::{FrameSource, Grab, SourceError};
 use crate::scenario::table::Simulation;
 use crate::sim::follow::{Follower, Recipe};
 use crate::sim::render::Renderer;
-use crate::width_control::RobotState;
 
 /// Reports that wait for the camera: some 20 s of a robot that reports every
 /// 20 ms.

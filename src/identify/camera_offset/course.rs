@@ -2,9 +2,9 @@
 
 use super::data::Look;
 use super::data::float;
+use crate::core::robot::RobotState;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
-use crate::width_control::RobotState;
 
 /// Longest time between two reports over which the speed is taken to have changed
 /// evenly; the link counts as lost after it.

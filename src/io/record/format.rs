@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::width_control::{Event, Step};
+use crate::control::event::Event;
+use crate::control::step::Step;
 
 /// Version of this layout. A reader refuses a newer one.
 pub const FORMAT_VERSION: u32 = 1;

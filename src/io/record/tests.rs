@@ -1,11 +1,12 @@
 use std::io::Cursor;
 
 use super::*;
+use crate::control::step::{State, Trace};
 use crate::core::frame::{Channel, Pixels};
+use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::units::{Mm, MmPerS};
 use crate::io::image_file;
 use crate::io::recording::{Entry, Recording};
-use crate::width_control::{RobotLimits, RobotMode, RobotState, State, Trace};
 
 mod disk;
 mod trouble;

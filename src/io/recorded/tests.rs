@@ -2,9 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
+use crate::control::step::ExtruderStep;
+use crate::core::robot::RobotMode;
 use crate::io::recorded::*;
-use crate::width_control::RobotMode;
-use crate::width_control::step::ExtruderStep;
 
 const OFFSET: f64 = 30.0;
 const HEIGHT: f64 = 1.5;

@@ -2,12 +2,13 @@
 //! the operator is told of it.
 
 use super::{Ending, Loop};
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::time::{Span, Stamp};
 use crate::drivers::extruder::{ExtruderConfig, ExtruderEvent};
 use crate::extruder::{ExtruderState, PumpMode};
 use crate::link::ErrCode;
 use crate::rows::names;
-use crate::width_control::{Event, Step};
 
 /// What the control thread keeps of its extruder.
 pub struct ExtruderWatch {

@@ -2,11 +2,12 @@
 
 use super::super::eye::Look;
 use super::Loop;
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::rows::frame_row::{ControlColumns, FrameRow};
 use crate::vision::Reject;
-use crate::width_control::{Event, Step};
 
 impl Loop<'_> {
     /// A frame that was looked at: the event, its answer and the log's row.

@@ -4,11 +4,12 @@
 use std::sync::atomic::Ordering;
 
 use super::{Ending, Loop};
+use crate::control::step::Command;
+use crate::core::robot::RobotLimits;
 use crate::core::time::Stamp;
 use crate::drivers::robot::{LinkClient, RobotEvent, Written};
 use crate::run::ports::RobotPort;
 use crate::width_control::limiter::Limits;
-use crate::width_control::{Command, RobotLimits};
 
 /// The link as the runner's robot, which remembers when it last wrote.
 pub struct LinkPort {

@@ -1,7 +1,7 @@
 //! When a run ends that is there for a course of steps.
 
+use crate::control::step::{State, Step};
 use crate::width_control::steps::Progress;
-use crate::width_control::{State, Step};
 
 /// Watches a course of steps.
 #[derive(Debug, Clone, Copy, Default)]

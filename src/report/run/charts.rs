@@ -5,12 +5,13 @@ use super::distance::DistanceCharts;
 use super::extruder::ExtruderCharts;
 use super::series::Series;
 use super::strip::{Mark, Strip};
+use crate::control::event::Event;
+use crate::control::step::{State, Step};
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
 use crate::rows::frame_row::FrameRow;
 use crate::rows::names;
 use crate::rows::summary::Follower;
-use crate::width_control::{Event, State, Step};
 
 /// A quantity over time (or frames) and over path.
 #[derive(Debug, Default)]

@@ -7,8 +7,8 @@ use super::legend;
 use super::palette;
 use super::plot::{Layer, Plot, y_range};
 use super::series::Series;
+use crate::control::step::Step;
 use crate::rows::summary::DistanceSummary;
-use crate::width_control::Step;
 
 /// What the plots are drawn from, over where the bead was laid.
 #[derive(Debug, Default)]

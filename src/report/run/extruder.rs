@@ -12,12 +12,13 @@ use super::series::Series;
 use super::strip::{Mark, Strip};
 use super::strips;
 use super::strips::Row;
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::core::units::Mm3PerS;
 use crate::extruder::{Drive, ExtruderReport, ExtruderState};
 use crate::rows::names;
 use crate::rows::summary::ExtruderSummary;
-use crate::width_control::{Event, Step};
 
 /// The states of the extruder side.
 const STATES: [&str; 6] = ["off", "starting", "running", "ending", "holding", "fault"];

@@ -6,12 +6,14 @@ use serde::Serialize;
 
 use super::Note;
 use super::follow::{Follower, Lapse};
+use crate::control::event::Event;
+use crate::control::step::{State, Step};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;
 use crate::numeric::statistics::{Distribution, Moments};
 use crate::rows::frame_row::FrameRow;
 use crate::rows::names;
-use crate::width_control::{Event, Limit, State, Step};
+use crate::width_control::limiter::Limit;
 
 /// Path length after the start of control from which the bead counts as
 /// settled.

@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
+use crate::control::step::Step;
 use crate::width_control::distance::Use;
-use crate::width_control::{DistanceTrace, Distrust, Step};
+use crate::width_control::{DistanceTrace, Distrust};
 
 /// Widths by what became of them, and what was believed at last.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

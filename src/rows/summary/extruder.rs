@@ -6,12 +6,13 @@ use serde::Serialize;
 
 use super::profile::{ProfileSummary, ProfileTally};
 
+use crate::control::event::Event;
+use crate::control::step::{State, Step};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm3PerS;
 use crate::extruder::{CommandLimit, ExtruderFault, ExtruderState};
 use crate::numeric::statistics::Moments;
 use crate::rows::names;
-use crate::width_control::{Event, State, Step};
 
 /// What the extruder side came to.
 #[derive(Debug, Clone, PartialEq, Serialize)]

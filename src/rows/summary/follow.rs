@@ -1,9 +1,11 @@
 //! Follows a controller through its events and steps: in which state it was
 //! for how long, which limit acted, and where the nozzle is.
 
+use crate::control::event::Event;
+use crate::control::step::{Command, State, Step};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
-use crate::width_control::{Command, Event, Limit, State, Step};
+use crate::width_control::limiter::Limit;
 
 /// Where a run stands after the steps that it has seen.
 #[derive(Debug, Default)]

@@ -1,9 +1,9 @@
+use crate::control::step::{Command, Fault, Hold, State, Trace};
+use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::units::MmPerS;
 use crate::rows::frame_row::{ControlColumns, sample};
 use crate::rows::summary::*;
-use crate::width_control::{
-    Command, Fault, Hold, Limit, RobotLimits, RobotMode, RobotState, State, Trace,
-};
+use crate::width_control::limiter::Limit;
 
 const TARGET: Mm = Mm::constant(42.0);
 

@@ -1,7 +1,7 @@
 use crate::core::units::{Mm, MmPerS};
 use crate::rows::frame_row::sample;
 use crate::rows::widths::*;
-use crate::width_control::Limit;
+use crate::width_control::limiter::Limit;
 
 fn rows_of(with_control: bool, rows: &[FrameRow]) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();

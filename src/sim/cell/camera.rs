@@ -6,6 +6,7 @@ use nalgebra::Vector2;
 use crate::calibration::{Calibration, SurfaceMap};
 use crate::cell::Cell;
 use crate::cell::file::Mount;
+use crate::control::step::Step;
 use crate::core::frame::Frame;
 use crate::core::geometry::ImagePoint;
 use crate::core::time::Stamp;
@@ -17,7 +18,6 @@ use crate::sim::render::{RenderError, Renderer};
 use crate::sim::truth::Truth;
 use crate::sim::view::gauge_middle;
 use crate::vision::{Axis, Edges, Hints, Measurer, Reject, WidthMeasurement};
-use crate::width_control::Step;
 
 /// What the camera saw, for a witness.
 #[derive(Debug)]

@@ -1,11 +1,12 @@
 //! The simulated robot as the runner's port: the robot's own state machine,
 //! spoken to in the link's lines, without a socket between.
 
+use crate::control::step::Command;
+use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::link::{PcLine, RobotCell, RobotLine};
 use crate::run::ports::RobotPort;
-use crate::width_control::{Command, RobotLimits, RobotMode, RobotState};
 
 /// A robot within the process.
 #[derive(Debug)]

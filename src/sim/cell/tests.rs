@@ -5,12 +5,12 @@ use std::path::Path;
 use super::*;
 use crate::calibration::Calibration;
 use crate::cell::file::Purpose;
+use crate::control::step::Step;
 use crate::extruder::law::Constant;
 use crate::extruder::start_stop::{Laid, Timing};
 use crate::extruder::{ExtruderSetup, Law};
 use crate::identify::start_stop::file;
 use crate::run::runner::NoRecorder;
-use crate::width_control::Step;
 
 const CELL: &str = include_str!("../../../cells/starts.toml");
 const STARTS: &str = include_str!("../../../models/starts/simulated.toml");

@@ -1,9 +1,10 @@
 //! Who is told what happens in a simulated cell.
 
 use super::camera::Sight;
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::core::units::Mm3PerS;
-use crate::width_control::{Event, Step};
 
 /// Is told what happens in a simulated cell.
 pub trait Witness {

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use super::Shared;
+use crate::core::robot::RobotMode;
 use crate::core::time::Stamp;
 use crate::link::robot_line::mode_word;
 use crate::link::{Job, LineError, PcLine, RobotLine};
 use crate::simulators::server::{Answer, Machine, Taken};
-use crate::width_control::RobotMode;
 
 pub(super) struct RobotMachine {
     shared: Arc<Shared>,

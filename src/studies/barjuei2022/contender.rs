@@ -1,10 +1,10 @@
 //! Who lays the layers: the paper's loop, and the law by distance with the
 //! paper's camera and link or with faster ones.
 
-use crate::cell::control::{Exponent, WidthLaw};
 use crate::cell::file::{Cell, RunPart};
 use crate::core::time::Span;
 use crate::core::units::Mm;
+use crate::width_control::settings::{Exponent, WidthLaw};
 use crate::width_control::target::Target;
 
 /// Length of the gauge \[mm\].

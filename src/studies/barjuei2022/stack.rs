@@ -5,6 +5,8 @@ use nalgebra::Vector3;
 use super::{STAND_OFF_MM, camera_above};
 use crate::calibration::{Calibration, SurfaceMap};
 use crate::cell::file::{Cell, RunPart};
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::geometry::Pose;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
@@ -12,7 +14,6 @@ use crate::run::runner::NoRecorder;
 use crate::sim::cell::{Sight, SimCell, SimError, Witness};
 use crate::sim::score::{Score, mean};
 use crate::width_control::target::Target;
-use crate::width_control::{Event, Step};
 
 /// Two layers, one upon the other.
 #[derive(Debug, Clone, Copy, PartialEq)]

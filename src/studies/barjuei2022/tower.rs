@@ -3,6 +3,8 @@
 use super::stack::raised_camera;
 use super::{Contender, Rates, with_frames};
 use crate::cell::file::{Cell, RunPart};
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::run::runner::NoRecorder;
@@ -10,7 +12,6 @@ use crate::sim::cell::{Sight, SimCell, SimError, Witness};
 use crate::sim::score::mean;
 use crate::vision::Method;
 use crate::width_control::target::{Layers, Target};
-use crate::width_control::{Event, Step};
 
 /// Height of a layer.
 const LAYER: Mm = Mm::constant(20.0);

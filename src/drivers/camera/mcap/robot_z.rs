@@ -2,9 +2,9 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use crate::control::event::Event;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
-use crate::width_control::Event;
 
 /// Heights over time. Copies share what they know, so that one can be asked
 /// while another is being filled.
@@ -33,9 +33,9 @@ impl RobotZ {
 
 #[cfg(test)]
 mod tests {
+    use crate::core::robot::{RobotMode, RobotState};
     use crate::core::units::MmPerS;
     use crate::drivers::camera::mcap::robot_z::*;
-    use crate::width_control::{RobotMode, RobotState};
 
     #[test]
     fn the_newest_state_counts() {

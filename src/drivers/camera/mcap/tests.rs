@@ -3,13 +3,15 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use crate::cell::file::KeepFrames;
+use crate::control::event::Event;
+use crate::control::step::Step;
 use crate::core::frame::Pixels;
+use crate::core::robot::{RobotMode, RobotState};
 use crate::core::units::{Mm, MmPerS};
 use crate::drivers::camera::mcap::*;
 use crate::io::foxglove::timestamp;
 use crate::io::record::{RecordConfig, start};
 use crate::run::ports::Recorder;
-use crate::width_control::{Event, RobotMode, RobotState, Step};
 
 fn frame(seq: u64, ms: u64) -> Frame {
     let values = (0..12).map(|at| (at * 20 + seq).to_le_bytes()[0]).collect();

@@ -2,6 +2,7 @@
 
 use std::sync::LazyLock;
 
+use super::dwell::{Dwell, tune};
 use super::*;
 use crate::extruder::start_stop::Timing;
 use crate::identify::start_stop::StartStopFit;

@@ -2,11 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::distance::{DistanceTrace, Distrust};
-use super::steps::StepsTrace;
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS};
 use crate::extruder::{ExtruderCommand, ExtruderFault, ExtruderState, ExtruderTrace};
+use crate::width_control::Limit;
+use crate::width_control::distance::{DistanceTrace, Distrust};
+use crate::width_control::steps::StepsTrace;
 
 /// What is to be sent to the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -16,27 +17,6 @@ pub enum Command {
     Speed(MmPerS),
     /// A controlled stop.
     Stop,
-}
-
-/// Which limit acted on a setpoint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Limit {
-    /// None.
-    #[default]
-    None,
-    /// The slowest speed of the cell.
-    MinSpeed,
-    /// The fastest speed of the cell.
-    MaxSpeed,
-    /// The acceleration of the cell, while speeding up.
-    Acceleration,
-    /// The acceleration of the cell, while slowing down.
-    Deceleration,
-    /// The robot's own: it moves slower than it was told.
-    RobotSlower,
-    /// The robot's own: it moves faster than it was told.
-    RobotFaster,
 }
 
 /// Why the controller does not track.
