@@ -9,5 +9,6 @@ pub mod progress;
 pub mod record;
 pub mod recorded;
 pub mod recording;
+pub mod replay;
 pub mod stop;
 pub mod whole_file;

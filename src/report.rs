@@ -11,5 +11,5 @@ pub mod planned;
 pub mod run;
 pub mod sheet;
 #[cfg(test)]
-pub mod synthetic;
+pub(crate) mod synthetic;
 pub mod tuned;

@@ -1,5 +1,4 @@
 //! What a controller is plugged into, and what drives it.
 
 pub mod ports;
-pub mod replay;
 pub mod runner;

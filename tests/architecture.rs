@@ -1,77 +1,256 @@
-//! Dependencies point one way, and the core opens nothing.
+//! Rooms use each other in one direction, and the core opens nothing.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Modules from the innermost to the outermost; each may use those before it.
-/// `config` comes before `sim`, whose plain parameter types it fills.
-const LAYERS: [&[&str]; 11] = [
-    &["units", "time"],
-    &["frame", "geometry", "model", "document"],
-    &["bridge", "calib", "vision", "control", "extruder", "identify", "link", "plan"],
-    &["config"],
-    &["controller"],
-    &["ports", "runner"],
-    &["sim"],
-    &["tune"],
-    &["io", "offline"],
-    &["live"],
-    &["cli"],
+use structure::tree::Tree;
+use structure::{circles, uses};
+
+/// Every room with the rooms that it may use. A room stands after all that it uses, so
+/// that there is no circle.
+const ROOMS: [(&str, &[&str]); 26] = [
+    ("core", &[]),
+    ("numeric", &[]),
+    ("document", &[]),
+    ("bridge", &["core"]),
+    ("calibration", &["core", "numeric", "document", "bridge"]),
+    ("vision", &["core", "numeric", "bridge", "calibration"]),
+    ("width_control", &["core"]),
+    ("identify", &["core", "numeric", "document"]),
+    ("extruder", &["core", "numeric", "document", "identify"]),
+    ("plan", &["core", "numeric", "document", "extruder"]),
+    ("scenario", &["core", "document"]),
+    ("control", &["core", "width_control", "extruder"]),
+    (
+        "cell",
+        &[
+            "core",
+            "numeric",
+            "document",
+            "calibration",
+            "vision",
+            "width_control",
+            "identify",
+            "extruder",
+            "scenario",
+            "control",
+        ],
+    ),
+    ("link", &["core", "extruder"]),
+    ("run", &["core", "extruder", "control"]),
+    (
+        "sim",
+        &[
+            "core",
+            "numeric",
+            "calibration",
+            "vision",
+            "width_control",
+            "identify",
+            "extruder",
+            "scenario",
+            "control",
+            "cell",
+            "link",
+            "run",
+        ],
+    ),
+    ("io", &["core", "document", "calibration", "identify", "extruder", "control", "cell", "run"]),
+    (
+        "assembly",
+        &[
+            "core",
+            "numeric",
+            "document",
+            "calibration",
+            "width_control",
+            "identify",
+            "extruder",
+            "cell",
+            "sim",
+            "io",
+        ],
+    ),
+    (
+        "tune",
+        &[
+            "core",
+            "numeric",
+            "calibration",
+            "width_control",
+            "identify",
+            "scenario",
+            "control",
+            "cell",
+            "link",
+            "run",
+            "sim",
+        ],
+    ),
+    ("simulators", &["core", "extruder", "link", "run", "sim", "io"]),
+    (
+        "drivers",
+        &["core", "bridge", "extruder", "scenario", "control", "cell", "link", "run", "sim", "io"],
+    ),
+    ("rows", &["core", "numeric", "vision", "width_control", "extruder", "control", "cell", "io"]),
+    (
+        "live",
+        &[
+            "core",
+            "calibration",
+            "vision",
+            "width_control",
+            "extruder",
+            "control",
+            "cell",
+            "link",
+            "run",
+            "sim",
+            "io",
+            "drivers",
+            "rows",
+        ],
+    ),
+    (
+        "report",
+        &[
+            "core",
+            "numeric",
+            "calibration",
+            "vision",
+            "width_control",
+            "identify",
+            "extruder",
+            "plan",
+            "control",
+            "cell",
+            "sim",
+            "io",
+            "tune",
+            "rows",
+        ],
+    ),
+    (
+        "studies",
+        &[
+            "core",
+            "numeric",
+            "document",
+            "calibration",
+            "vision",
+            "width_control",
+            "identify",
+            "extruder",
+            "plan",
+            "scenario",
+            "control",
+            "cell",
+            "run",
+            "sim",
+            "io",
+            "report",
+        ],
+    ),
+    (
+        "cli",
+        &[
+            "core",
+            "numeric",
+            "document",
+            "calibration",
+            "vision",
+            "width_control",
+            "identify",
+            "extruder",
+            "plan",
+            "control",
+            "cell",
+            "link",
+            "run",
+            "sim",
+            "io",
+            "assembly",
+            "tune",
+            "simulators",
+            "drivers",
+            "rows",
+            "live",
+            "report",
+            "studies",
+        ],
+    ),
 ];
-/// What only the edges may touch.
+
+/// Rooms at the edges: they may open files and sockets, read clocks and start threads.
+const EDGES: [&str; 8] =
+    ["io", "assembly", "simulators", "drivers", "rows", "live", "report", "cli"];
+/// What only they may touch.
 const EDGES_ONLY: [&str; 6] =
     ["std::fs", "std::net", "Instant::now", "SystemTime", "std::process", "std::thread"];
-const CORE: usize = 8;
 
-fn sources(module: &str) -> Vec<PathBuf> {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut found = vec![src.join(format!("{module}.rs"))];
-    let mut folders = vec![src.join(module)];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(folder).into_iter().flatten() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|ending| ending == "rs") {
-                found.push(path);
-            }
-        }
-    }
-    found
+fn source() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
 }
 
-/// Lines of a file that run outside its tests.
-fn code(path: &Path) -> Vec<String> {
-    let text = fs::read_to_string(path).unwrap();
-    let tests = path.ends_with("tests.rs") || path.iter().any(|part| part == "tests");
-    let shipped = if tests { "" } else { text.split("#[cfg(test)]\nmod").next().unwrap() };
-    shipped.lines().filter(|line| !line.trim_start().starts_with("//")).map(str::to_owned).collect()
+fn tree() -> Tree {
+    Tree::read(&source().join("lib.rs")).unwrap()
 }
 
 #[test]
-fn dependencies_point_one_way() {
-    for (layer, modules) in LAYERS.iter().enumerate() {
-        let outer: Vec<&str> = LAYERS[layer + 1..].concat();
-        for path in modules.iter().flat_map(|module| sources(module)) {
-            for line in code(&path) {
-                for module in &outer {
-                    let simulated_bead = *module == "sim" && path.ends_with("config/rendered.rs");
-                    let used = line.contains(&format!("crate::{module}::"));
-                    assert!(!used || simulated_bead, "{}: {line}", path.display());
-                }
-            }
+fn every_room_is_in_the_table_and_uses_only_rooms_before_it() {
+    let rooms: BTreeSet<&str> = ROOMS.iter().map(|(room, _)| *room).collect();
+    let tree = tree();
+    let found: BTreeSet<&str> = tree.modules[0].children.keys().map(String::as_str).collect();
+    assert_eq!(rooms, found);
+    let mut before = BTreeSet::new();
+    for (room, may_use) in ROOMS {
+        for used in may_use {
+            assert!(before.contains(used), "{room} uses {used}, which stands after it");
+        }
+        before.insert(room);
+    }
+}
+
+#[test]
+fn a_room_uses_what_the_table_allows_and_nothing_else() {
+    let used = uses::between_rooms(&tree());
+    for ((from, to), file) in &used {
+        let allowed = ROOMS.iter().any(|(room, uses)| room == from && uses.contains(&to.as_str()));
+        assert!(allowed || from == "crate", "{from} uses {to} in {}", file.display());
+    }
+    for (from, may_use) in ROOMS {
+        for to in may_use {
+            let pair = (from.to_owned(), (*to).to_owned());
+            assert!(used.contains_key(&pair), "{from} no longer uses {to}: take it off the table");
         }
     }
+}
+
+#[test]
+fn rooms_form_no_circle() {
+    let mut graph = std::collections::BTreeMap::new();
+    for (from, to) in uses::between_rooms(&tree()).into_keys() {
+        graph.entry(from).or_insert_with(BTreeSet::new).insert(to);
+    }
+    assert_eq!(circles::circles(&graph), Vec::<Vec<String>>::new());
 }
 
 #[test]
 fn the_core_opens_nothing_and_reads_no_clock() {
-    for path in LAYERS[..CORE].concat().iter().flat_map(|module| sources(module)) {
-        for line in code(&path) {
+    let tree = tree();
+    let files: BTreeSet<&Path> = (0..tree.modules.len())
+        .filter(|module| !EDGES.contains(&tree.room(*module)) && tree.room(*module) != "crate")
+        .map(|module| tree.modules[module].file.as_path())
+        .collect();
+    for file in files {
+        let text = fs::read_to_string(file).unwrap();
+        let shipped = text.split("#[cfg(test)]\nmod").next().unwrap();
+        for line in shipped.lines().filter(|line| !line.trim_start().starts_with("//")) {
             for edge in EDGES_ONLY {
-                assert!(!line.contains(edge), "{}: {line}", path.display());
+                assert!(!line.contains(edge), "{}: {line}", file.display());
             }
         }
     }

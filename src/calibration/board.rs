@@ -260,7 +260,7 @@ impl Board {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::board::*;
+    use super::*;
 
     fn board() -> Board {
         Board::new(4, 3, Mm::constant(20.0)).unwrap()

@@ -231,7 +231,7 @@ impl Camera {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::camera::*;
+    use super::*;
     use proptest::prelude::*;
 
     const LENS: Camera = Camera {

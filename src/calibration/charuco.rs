@@ -406,7 +406,7 @@ fn columns_of(markers: &[Marker], clear: f64) -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::charuco::*;
+    use super::*;
 
     #[test]
     fn markers_are_numbered_row_by_row_over_the_white_squares() {

@@ -104,7 +104,7 @@ impl Collector {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::collect::*;
+    use super::*;
     use crate::calibration::synthetic;
     use crate::calibration::synthetic::{board, poses};
     use crate::core::geometry::Pose;

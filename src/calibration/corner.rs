@@ -384,7 +384,7 @@ fn start(samples: &[Sample], lines: [Line; 2]) -> Option<Corner> {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::corner::*;
+    use super::*;
 
     #[test]
     fn the_slopes_are_the_derivatives() {

@@ -272,7 +272,7 @@ fn eliminate(
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::covariance::*;
+    use super::*;
     use nalgebra::Vector3;
 
     use crate::calibration::Quality;

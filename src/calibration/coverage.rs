@@ -77,7 +77,7 @@ fn cells(solution: &Solution) -> [[bool; GRID]; GRID] {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::coverage::*;
+    use super::*;
     use crate::core::geometry::Pose;
     use nalgebra::Point3;
 

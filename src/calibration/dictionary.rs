@@ -95,7 +95,7 @@ impl Dictionary {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::dictionary::*;
+    use super::*;
 
     #[test]
     fn all_codes_are_there_and_no_two_are_alike() {

@@ -361,7 +361,7 @@ impl Factor {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::equations::*;
+    use super::*;
     use crate::calibration::synthetic::TRUTH;
 
     fn corners() -> Vec<Corner> {

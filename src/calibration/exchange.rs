@@ -85,7 +85,7 @@ pub fn parse(file: &str, text: &str) -> Result<Import, Problems> {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::exchange::*;
+    use super::*;
     use proptest::prelude::*;
 
     fn intrinsics(numbers: [f64; 12]) -> Intrinsics {

@@ -232,7 +232,7 @@ fn uncertainty_text(uncertainty: &Uncertainty) -> String {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::file::*;
+    use super::*;
     use nalgebra::Point2;
 
     const EXAMPLE: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/calib/example.toml"));

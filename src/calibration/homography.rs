@@ -119,7 +119,7 @@ pub fn pose_before(camera: &Camera, corners: &[Corner]) -> Option<Pose> {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::homography::*;
+    use super::*;
     use nalgebra::Point3;
 
     #[test]

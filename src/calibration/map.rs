@@ -137,7 +137,7 @@ pub fn usual_bead_mm(covariance: &Covariance) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::map::*;
+    use super::*;
     use crate::calibration::next_view;
     use crate::calibration::plane::OnBed;
     use crate::calibration::solve;

@@ -238,7 +238,7 @@ impl SurfaceMap {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::model::*;
+    use super::*;
 
     /// Looks straight down from 400 mm; the file of `contract`'s example.
     fn straight_down() -> Calibration {

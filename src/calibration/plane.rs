@@ -87,7 +87,7 @@ pub fn bed_from_board(board: &Pose, thickness: Mm) -> Pose {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::plane::*;
+    use super::*;
     use crate::calibration::synthetic;
     use crate::calibration::synthetic::{TRUTH, board};
 

@@ -130,11 +130,11 @@ pub fn tilt_deg(view: &View) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::calibration::Camera;
     use crate::calibration::board::all_seen;
     use crate::calibration::equations::{Free, Model, SHARED};
     use crate::calibration::lens::Lens;
-    use crate::calibration::quality::*;
     use crate::core::geometry::{ImagePoint, Pose};
     use nalgebra::Vector2;
 

@@ -54,8 +54,8 @@ pub(super) fn in_the_middle(map: &SurfaceMap, image_size_px: [u32; 2]) -> Option
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::calibration::Camera;
-    use crate::calibration::scale::*;
     use crate::core::geometry::Pose;
     use nalgebra::Vector3;
 

@@ -81,9 +81,9 @@ pub fn share_at(surface: &SurfaceMap, bead: &Bead, middle: ImagePoint) -> Option
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::calibration::covariance::Covariance;
     use crate::calibration::plane::OnBed;
-    use crate::calibration::share_map::*;
     use crate::calibration::synthetic;
     use crate::calibration::synthetic::{SIZE, board, poses};
     use crate::calibration::{Calibration, Quality, solve};

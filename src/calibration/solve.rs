@@ -336,10 +336,10 @@ pub const SHARED_NAMES: [&str; SHARED] = {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::calibration::Calibration;
     use crate::calibration::board::all_seen;
     use crate::calibration::plane::bed_from_board;
-    use crate::calibration::solve::*;
     use crate::calibration::synthetic;
     use crate::calibration::synthetic::{SIZE, TRUTH, board, poses};
     use crate::core::units::Mm;

@@ -205,9 +205,9 @@ fn lies(
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::calibration::synthetic;
     use crate::calibration::synthetic::{SIZE, TRUTH, board};
-    use crate::calibration::verify::*;
 
     const THICKNESS: Mm = Mm::constant(3.0);
 

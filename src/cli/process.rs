@@ -18,6 +18,7 @@ use crate::drivers::camera::open::OfflineOptions;
 use crate::io::progress::Progress;
 use crate::io::stop::StopSignal;
 use crate::report::overlays::OverlayWriter;
+use crate::report::run::RunPage;
 use crate::rows::edges::EdgesWriter;
 use crate::rows::frame_row::FrameRow;
 use crate::rows::log::{LogOptions, RunLog};
@@ -75,7 +76,7 @@ pub fn run(args: &ProcessArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     };
     let recorded = open::recorded(&args.input, options).map_err(wrong_input)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
-    let log = RunLog::create(LogOptions {
+    let log = RunPage::log(LogOptions {
         folder: args.out.clone(),
         title: format!("Widths of {}", args.input.display()),
         about: vec![

@@ -16,7 +16,7 @@ use crate::control::Controller;
 use crate::control::step::Step;
 use crate::io::record::ExtruderFile;
 use crate::io::recording::{Entry, Recording};
-use crate::run::replay::{Difference, ReplayReport, replay};
+use crate::io::replay::{Difference, ReplayReport, replay};
 
 /// Exit status of a replay that had to end before the recording did.
 const RECORDS_LOST: u8 = 3;

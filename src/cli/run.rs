@@ -14,7 +14,8 @@ use crate::io::clock::RunClock;
 use crate::io::record::{ExtruderFile, RecordConfig};
 use crate::io::stop::StopSignal;
 use crate::live::{self, LiveExtruder, LiveReport, LiveRun};
-use crate::rows::log::{ControlFacts, LogOptions, RunLog};
+use crate::report::run::RunPage;
+use crate::rows::log::{ControlFacts, LogOptions};
 use crate::width_control::target::Target;
 
 /// Runs the live cell: measures, controls the robot's speed, records.
@@ -93,7 +94,7 @@ pub fn live(
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
     let (extruder, extruder_files) = live_extruder(&loaded, &run)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
-    let log = RunLog::create(LogOptions {
+    let log = RunPage::log(LogOptions {
         folder: log.to_owned(),
         title,
         about: about(&loaded, &run, extruder.as_ref()),

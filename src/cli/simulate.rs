@@ -18,6 +18,7 @@ use crate::core::units::{Mm, Mm3PerS};
 use crate::io::progress::Progress;
 use crate::io::record::{self, RecordConfig, RecorderHandle};
 use crate::io::stop::StopSignal;
+use crate::report::run::RunPage;
 use crate::rows::frame_row::{ControlColumns, FrameRow};
 use crate::rows::log::{ControlFacts, LogOptions, RunLog};
 use crate::rows::output::LogError;
@@ -67,7 +68,7 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
     let recorder = SimRecorder::of(args.record.then_some(&args.out), &loaded)?;
     let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, recorder, extruder)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
-    let log = RunLog::create(LogOptions {
+    let log = RunPage::log(LogOptions {
         folder: args.out.clone(),
         title: format!("Simulation of {}", args.scenario.display()),
         about: vec![

@@ -3,7 +3,7 @@
 mod distance;
 mod extruder;
 
-use crate::control::*;
+use super::*;
 use crate::core::robot::RobotLimits;
 use crate::core::time::Span;
 use crate::core::units::MmPerS2;

@@ -102,7 +102,7 @@ impl Frame {
 
 #[cfg(test)]
 mod tests {
-    use crate::core::frame::*;
+    use super::*;
 
     #[test]
     fn a_frame_holds_exactly_its_pixels() {

@@ -82,7 +82,7 @@ impl Pose {
 
 #[cfg(test)]
 mod tests {
-    use crate::core::geometry::*;
+    use super::*;
     use std::f64::consts::PI;
 
     #[test]

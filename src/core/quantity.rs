@@ -133,7 +133,7 @@ impl fmt::Display for Quantity {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-    use crate::core::quantity::*;
+    use super::*;
 
     #[test]
     fn a_columns_end_tells_its_unit() {

@@ -80,7 +80,7 @@ fn mark(since: &mut Option<Stamp>, now: Stamp, lasts: bool) {
 
 #[cfg(test)]
 mod tests {
-    use crate::core::readback::*;
+    use super::*;
 
     fn after(secs: f64, driven: f64) -> Verdict {
         let mut follow = Follow::default();

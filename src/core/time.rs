@@ -133,7 +133,7 @@ impl Sub for Span {
 
 #[cfg(test)]
 mod tests {
-    use crate::core::time::*;
+    use super::*;
 
     #[test]
     fn late_data_has_a_negative_span() {

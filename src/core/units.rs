@@ -187,7 +187,7 @@ impl Mul<Span> for MmPerS2 {
 
 #[cfg(test)]
 mod tests {
-    use crate::core::units::*;
+    use super::*;
 
     #[test]
     fn what_is_not_finite_is_refused_at_the_boundary() {

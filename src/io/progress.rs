@@ -96,7 +96,7 @@ fn line(what: &str, unit: &str, done: u64, total: Option<u64>, elapsed: Duration
 
 #[cfg(test)]
 mod tests {
-    use crate::io::progress::*;
+    use super::*;
 
     #[test]
     fn plain_lines_say_how_far() {

@@ -125,7 +125,7 @@ fn gaussian(z: f64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use crate::numeric::blurred_step::*;
+    use super::*;
 
     #[test]
     fn the_table_is_the_function() {

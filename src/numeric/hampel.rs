@@ -137,7 +137,7 @@ fn median(values: &mut [f64]) -> Option<f64> {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-    use crate::numeric::hampel::*;
+    use super::*;
     use proptest::prelude::*;
 
     #[test]

@@ -83,7 +83,7 @@ pub fn second_integral(u: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use crate::numeric::normal_distribution::*;
+    use super::*;
 
     #[test]
     fn the_series_are_the_formulas() {

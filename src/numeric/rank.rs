@@ -50,7 +50,7 @@ pub fn median_deviation(values: &mut [f32], median: f32) -> Option<f32> {
 
 #[cfg(test)]
 mod tests {
-    use crate::numeric::rank::*;
+    use super::*;
 
     #[test]
     fn ranks_are_those_of_the_sorted_values() {

@@ -183,7 +183,7 @@ pub fn as_f64(count: u64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use crate::numeric::statistics::*;
+    use super::*;
 
     #[test]
     fn moments_of_one_to_five() {

@@ -11,9 +11,9 @@ use super::run::palette::Ink;
 use super::run::plot::{Layer, Plot, y_range};
 use super::run::sections::legend;
 use super::run::series::Series;
+use super::run::series::series;
 use super::run::whole_page;
 use crate::sim::compare::{Estimate, Figures, JUDGED_AFTER_MM, SCATTER_AFTER_MM};
-use crate::studies::reproduce::series;
 
 /// One number of one controller at one width, as `compare.json` has it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -267,7 +267,7 @@ fn curves(
 
 #[cfg(test)]
 mod tests {
-    use crate::report::compare::*;
+    use super::*;
 
     #[test]
     fn a_controller_that_mostly_never_settles_says_so() {

@@ -41,8 +41,8 @@ pub fn print(
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::core::units::Mm;
-    use crate::report::offset::*;
 
     #[test]
     fn widths_are_put_in_the_order_of_their_frames() {

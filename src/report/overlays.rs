@@ -57,9 +57,9 @@ fn name(frame: u64, outcome: Result<WidthMeasurement, &'static str>) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::core::frame::Pixels;
     use crate::core::time::Stamp;
-    use crate::report::overlays::*;
     use crate::report::synthetic;
     use crate::vision::Reject;
 

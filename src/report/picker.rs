@@ -155,11 +155,11 @@ fn draw(kept: &Kept) -> Option<Chosen> {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::core::frame::Pixels;
     use crate::core::geometry::Roi;
     use crate::core::time::Stamp;
     use crate::core::units::Mm;
-    use crate::report::picker::*;
     use crate::rows::frame_row::sample;
     use crate::vision::{Axis, Polarity};
 

@@ -9,6 +9,7 @@ pub mod extruder;
 pub mod headline;
 pub mod histogram;
 pub mod legend;
+mod page;
 pub mod palette;
 pub mod pauses;
 pub mod plot;
@@ -24,6 +25,8 @@ use crate::extruder::Drive;
 use crate::numeric::statistics::Distribution;
 use crate::rows::summary::Summary;
 use crate::width_control::limiter::Limits;
+pub use page::RunPage;
+
 use charts::Charts;
 use headline::Level;
 

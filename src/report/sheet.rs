@@ -260,10 +260,10 @@ fn shown(mm: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::calibration::board::Marks;
     use crate::calibration::dictionary::Dictionary;
     use crate::core::units::Mm;
-    use crate::report::sheet::*;
 
     fn board(square: f64) -> Board {
         Board::new(9, 6, Mm::new(square).unwrap()).unwrap()

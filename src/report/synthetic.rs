@@ -17,8 +17,9 @@ use crate::core::geometry::{ImagePoint, Roi};
 use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS, MmPerS2};
+use crate::report::run::RunPage;
 use crate::rows::frame_row::{ControlColumns, FrameRow, sample};
-use crate::rows::log::{ControlFacts, LogOptions, RunLog};
+use crate::rows::log::{ControlFacts, LogOptions};
 use crate::rows::summary::{Note, Summary};
 use crate::vision::{Axis, Edges, Gauge, Polarity, WidthMeasurement};
 use crate::width_control::limiter::Limit;
@@ -167,7 +168,7 @@ fn setpoint(time: f64) -> Step {
 
 /// Twenty seconds with a controller, 50 frames a second.
 pub fn run(folder: &Path) -> Summary {
-    let mut log = RunLog::create(options(folder, "Run of cell.toml <demo & more>", true)).unwrap();
+    let mut log = RunPage::log(options(folder, "Run of cell.toml <demo & more>", true)).unwrap();
     let mut edges = [Vec::new(), Vec::new()];
     let mut path = 0.0;
     for frame in 0..1000_u64 {
@@ -216,7 +217,7 @@ pub fn run(folder: &Path) -> Summary {
 
 /// Frames without times and without a controller.
 pub fn process(folder: &Path) -> Summary {
-    let mut log = RunLog::create(options(folder, "Frames of clip.mp4", false)).unwrap();
+    let mut log = RunPage::log(options(folder, "Frames of clip.mp4", false)).unwrap();
     let mut edges = [Vec::new(), Vec::new()];
     for frame in 0..300_u64 {
         let width = 42.0 + 0.5 * (frame as f64 * 0.05).sin() + 0.05 * chance(frame);
@@ -234,7 +235,7 @@ pub const HOURS_OF_FRAMES: u64 = 100_000;
 
 /// Three hours at ten frames a second, without pictures.
 pub fn hours(folder: &Path) -> Summary {
-    let mut log = RunLog::create(options(folder, "A long run", true)).unwrap();
+    let mut log = RunPage::log(options(folder, "A long run", true)).unwrap();
     for frame in 0..HOURS_OF_FRAMES {
         let time = frame as f64 * 0.1;
         let path = time * 80.0;

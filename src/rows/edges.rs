@@ -78,8 +78,8 @@ fn place_fields(place: Option<EdgePlace>) -> [String; 3] {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::core::geometry::ImagePoint;
-    use crate::rows::edges::*;
 
     #[test]
     fn a_line_has_what_was_found_on_it() {

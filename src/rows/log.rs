@@ -1,10 +1,10 @@
-//! Takes down a run, one fact at a time, and leaves `widths.csv`,
-//! `summary.json` and `report.html`.
+//! Takes down a run, one fact at a time, and leaves `widths.csv`, `summary.json` and
+//! what its page makes of it.
 
 use std::path::PathBuf;
 
 use super::frame_row::FrameRow;
-use super::output::{LogError, make_folder, write_whole};
+use super::output::{LogError, make_folder};
 use super::summary::{Note, Summary, SummaryBuilder};
 use super::widths::WidthsWriter;
 use crate::cell::file::RunPart;
@@ -14,9 +14,7 @@ use crate::core::frame::Frame;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, Mm3PerS};
 use crate::extruder::{Drive, Law};
-use crate::report::picker::FramePicker;
-use crate::report::run::Report;
-use crate::report::run::charts::Charts;
+use crate::numeric::statistics::Distribution;
 use crate::vision::{Edges, Gauge};
 use crate::width_control::limiter::Limits;
 
@@ -65,14 +63,41 @@ impl ControlFacts {
     }
 }
 
+/// What people look at after a run, fed with the same facts as the rows.
+pub trait Page: std::fmt::Debug + Send {
+    /// A frame that was looked at, with its image and edges where they are at hand.
+    fn frame(&mut self, row: &FrameRow, image: Option<(&Frame, Option<Edges<'_>>)>);
+
+    /// An event and the step that answered it.
+    fn step(&mut self, now: Stamp, event: &Event, step: &Step);
+
+    /// The true flow through the nozzle, where a simulation knows it.
+    fn flow(&mut self, now: Stamp, flow: Mm3PerS);
+
+    /// Writes the page of a run that has ended.
+    fn write(self: Box<Self>, run: &EndedRun<'_>) -> Result<(), LogError>;
+}
+
+/// What is known of a run at its end.
+#[derive(Debug, Clone, Copy)]
+pub struct EndedRun<'a> {
+    /// What was known before its first frame.
+    pub options: &'a LogOptions,
+    /// What it came to.
+    pub summary: &'a Summary,
+    /// Latencies \[ms\]; none without a controller.
+    pub latencies: Option<&'a Distribution>,
+    /// What else the reader should know.
+    pub remarks: &'a [String],
+}
+
 /// The log of a run. Memory does not grow with its length.
 #[derive(Debug)]
 pub struct RunLog {
     options: LogOptions,
     widths: WidthsWriter,
     summary: SummaryBuilder,
-    charts: Charts,
-    pictures: FramePicker,
+    page: Box<dyn Page>,
     remarks: Vec<String>,
     /// Reasons for which the extruder refused lines.
     refused: Vec<String>,
@@ -80,15 +105,14 @@ pub struct RunLog {
 
 impl RunLog {
     /// Makes the folder and begins `widths.csv`.
-    pub fn create(options: LogOptions) -> Result<Self, LogError> {
+    pub fn create(options: LogOptions, page: Box<dyn Page>) -> Result<Self, LogError> {
         make_folder(&options.folder)?;
         let with_control = options.control.is_some();
         Ok(Self {
             widths: WidthsWriter::create(&options.folder, with_control)?,
             summary: SummaryBuilder::new(options.target, with_control)
                 .with_profile(options.control.and_then(|control| control.profile)),
-            charts: Charts::default(),
-            pictures: FramePicker::new(options.gauge),
+            page,
             remarks: Vec::new(),
             refused: Vec::new(),
             options,
@@ -105,10 +129,7 @@ impl RunLog {
     ) -> Result<(), LogError> {
         self.widths.write(row)?;
         self.summary.frame(row);
-        self.charts.frame(row);
-        if let Some(frame) = picture {
-            self.pictures.offer(row, frame, edges);
-        }
+        self.page.frame(row, picture.map(|frame| (frame, edges)));
         Ok(())
     }
 
@@ -116,7 +137,7 @@ impl RunLog {
     /// rows' `time_s`.
     pub fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         self.summary.step(now, event, step);
-        self.charts.step(now, event, step);
+        self.page.step(now, event, step);
         match event {
             Event::LinkDown { reason } => {
                 self.remark(now, "the link to the robot was lost", reason);
@@ -142,7 +163,7 @@ impl RunLog {
 
     /// The true flow through the nozzle, where a simulation knows it.
     pub fn flow(&mut self, now: Stamp, wanted: Option<Mm3PerS>, flow: Mm3PerS) {
-        self.charts.extruder.flow(now, flow);
+        self.page.flow(now, flow);
         self.summary.flow(wanted, flow);
     }
 
@@ -166,19 +187,12 @@ impl RunLog {
         self.widths.finish()?;
         let summary = self.summary.finish();
         summary.write(&self.options.folder)?;
-        let report = Report {
-            title: &self.options.title,
-            about: &self.options.about,
-            max_rejected_share: self.options.max_rejected_share,
+        self.page.write(&EndedRun {
+            options: &self.options,
             summary: &summary,
-            charts: &self.charts,
-            limits: self.options.control.map(|control| control.limits),
-            extruder: self.options.control.and_then(|control| control.extruder),
             latencies: self.summary.latencies(),
-            pictures: &self.pictures.finish(),
             remarks: &self.remarks,
-        };
-        write_whole(&self.options.folder, "report.html", report.page().as_bytes())?;
+        })?;
         Ok(summary)
     }
 
@@ -197,22 +211,23 @@ impl RunLog {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+    use crate::report::run::RunPage;
     use crate::report::synthetic;
-    use crate::rows::log::*;
 
     #[test]
     fn a_folder_that_cannot_be_one_is_refused_before_the_first_frame() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("out");
         std::fs::write(&file, "").unwrap();
-        let error = RunLog::create(synthetic::options(&file, "t", false)).unwrap_err();
+        let error = RunPage::log(synthetic::options(&file, "t", false)).unwrap_err();
         assert!(matches!(error, LogError::NotAFolder { .. }), "{error}");
     }
 
     #[test]
     fn a_log_that_is_let_go_leaves_no_final_name() {
         let folder = tempfile::tempdir().unwrap();
-        drop(RunLog::create(synthetic::options(folder.path(), "t", true)).unwrap());
+        drop(RunPage::log(synthetic::options(folder.path(), "t", true)).unwrap());
         let names: Vec<_> =
             std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().file_name()).collect();
         assert_eq!(names, ["widths.csv.partial"]);
@@ -222,7 +237,7 @@ mod tests {
     fn a_report_that_cannot_be_written_costs_no_rows() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("report.html")).unwrap();
-        let log = RunLog::create(synthetic::options(folder.path(), "t", true)).unwrap();
+        let log = RunPage::log(synthetic::options(folder.path(), "t", true)).unwrap();
         let error = log.finish().unwrap_err();
         assert!(error.to_string().contains("report.html"), "{error}");
         assert!(folder.path().join("widths.csv").is_file());
@@ -232,7 +247,7 @@ mod tests {
     #[test]
     fn remarks_are_bounded() {
         let folder = tempfile::tempdir().unwrap();
-        let mut log = RunLog::create(synthetic::options(folder.path(), "t", true)).unwrap();
+        let mut log = RunPage::log(synthetic::options(folder.path(), "t", true)).unwrap();
         for index in 0..1000 {
             log.note(&Note::Remark(format!("remark {index}")));
         }

@@ -110,7 +110,7 @@ pub fn write_whole(folder: &Path, name: &str, content: &[u8]) -> Result<PathBuf,
 
 #[cfg(test)]
 mod tests {
-    use crate::rows::output::*;
+    use super::*;
 
     #[test]
     fn a_folder_that_is_a_file_is_named() {

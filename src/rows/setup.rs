@@ -143,7 +143,7 @@ fn on_skew(offset: f64, sigma: f64) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use crate::rows::setup::*;
+    use super::*;
 
     fn hints(contrast: f64, noise: f64, blur: f64, saturated: f64, used: f64) -> HintSummary {
         HintSummary {

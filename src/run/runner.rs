@@ -99,8 +99,8 @@ impl Recorder for NoRecorder {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::control::step::{Command, Hold, State};
-    use crate::run::runner::*;
 
     struct NoRobot;
 

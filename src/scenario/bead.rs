@@ -63,7 +63,7 @@ impl BeadModel {
 
 #[cfg(test)]
 mod tests {
-    use crate::scenario::bead::*;
+    use super::*;
 
     #[test]
     fn the_pieces_of_the_fitted_bead_meet_at_42_mm() {

@@ -48,7 +48,7 @@ impl Flow {
 
 #[cfg(test)]
 mod tests {
-    use crate::scenario::disturbance::*;
+    use super::*;
 
     #[test]
     fn a_step_and_a_wave_multiply() {

@@ -124,7 +124,7 @@ fn share(part: usize, of: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::sets;
-    use crate::studies::accuracy::*;
+    use super::*;
 
     #[test]
     fn figures_are_counted_over_the_frames_they_are_of() {

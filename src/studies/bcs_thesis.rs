@@ -54,7 +54,7 @@ pub mod table;
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-    use crate::studies::bcs_thesis::*;
+    use super::*;
 
     #[test]
     fn the_flow_has_the_published_poles_and_the_reciprocal_of_the_printed_zeros() {

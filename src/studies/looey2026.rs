@@ -218,7 +218,7 @@ pub mod strand;
 pub mod table;
 #[cfg(test)]
 mod tests {
-    use crate::studies::looey2026::*;
+    use super::*;
 
     #[test]
     fn cases_1_to_5_converge_as_in_an_independent_simulation() {

@@ -13,7 +13,6 @@ use crate::extruder::feedforward::FeedforwardError;
 use crate::extruder::pressure::PressureError;
 use crate::io::progress::Progress;
 use crate::numeric::lti::ModelError;
-use crate::report::run::series::Series;
 use crate::report::run::whole_page;
 use crate::sim::cell::SimError;
 use crate::sim::render::RenderError;
@@ -251,18 +250,9 @@ impl Rows {
     }
 }
 
-/// Points as a curve that can be drawn.
-pub fn series(points: &[(f64, f64)]) -> Series {
-    let mut series = Series::default();
-    for (x, y) in points {
-        series.push(*x, *y);
-    }
-    series
-}
-
 #[cfg(test)]
 mod tests {
-    use crate::studies::reproduce::*;
+    use super::*;
 
     #[test]
     fn a_row_has_the_keys_that_others_rely_on() {

@@ -73,7 +73,7 @@ impl Limits {
 
 #[cfg(test)]
 mod tests {
-    use crate::width_control::limiter::*;
+    use super::*;
     use proptest::prelude::*;
 
     const LIMITS: Limits = Limits {

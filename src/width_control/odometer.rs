@@ -57,9 +57,9 @@ impl Odometer {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::core::robot::RobotMode;
     use crate::core::units::MmPerS;
-    use crate::width_control::odometer::*;
 
     fn report(path: f64, mode: RobotMode) -> RobotState {
         RobotState {

@@ -81,7 +81,7 @@ fn gather(gains: PiGains, error: Mm, dt: Span) -> MmPerS {
 
 #[cfg(test)]
 mod tests {
-    use crate::width_control::pi::*;
+    use super::*;
 
     const GAINS: PiGains = PiGains { kp_per_s: 5.925, ki_per_s2: 4.74 };
     const TENTH: Span = Span::from_millis(100);

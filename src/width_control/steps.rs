@@ -175,7 +175,7 @@ impl Steps {
 
 #[cfg(test)]
 mod tests {
-    use crate::width_control::steps::*;
+    use super::*;
 
     fn settings() -> StepSettings {
         StepSettings {

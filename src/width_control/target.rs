@@ -132,7 +132,7 @@ impl Target {
 
 #[cfg(test)]
 mod tests {
-    use crate::width_control::target::*;
+    use super::*;
 
     fn mm(value: f64) -> Mm {
         Mm::constant(value)

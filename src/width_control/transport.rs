@@ -65,8 +65,8 @@ impl Transport {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::core::robot::RobotMode;
-    use crate::width_control::transport::*;
 
     fn report(path: f64, speed: f64) -> RobotState {
         RobotState {

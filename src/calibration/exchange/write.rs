@@ -17,7 +17,7 @@ pub fn row(values: &[f64]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::exchange::write::*;
+    use super::*;
 
     #[test]
     fn a_number_has_a_point_and_a_signed_exponent() {

@@ -186,7 +186,7 @@ fn wrong(line: usize, found: impl Into<String>, expected: &str) -> Problem {
 
 #[cfg(test)]
 mod tests {
-    use crate::calibration::exchange::yaml::*;
+    use super::*;
 
     #[test]
     fn lines_count_from_the_top_of_the_file_whatever_its_head() {

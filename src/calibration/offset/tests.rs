@@ -1,8 +1,8 @@
 use nalgebra::{Point3, Rotation3, Vector3};
 
+use super::*;
 use crate::calibration::board::Marks;
 use crate::calibration::dictionary::Dictionary;
-use crate::calibration::offset::*;
 use crate::calibration::sighting;
 use crate::calibration::sighting::Sighting;
 use crate::calibration::{Camera, Quality};

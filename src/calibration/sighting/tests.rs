@@ -1,7 +1,7 @@
+use super::*;
 use crate::calibration::Camera;
 use crate::calibration::board::all_seen;
 use crate::calibration::dictionary::Dictionary;
-use crate::calibration::sighting::*;
 use crate::calibration::synthetic;
 use crate::calibration::synthetic::poses;
 use crate::core::frame::Pixels;

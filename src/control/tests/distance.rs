@@ -1,6 +1,6 @@
 //! The width held by distance, event by event.
 
-use crate::control::tests::*;
+use super::*;
 use crate::width_control::distance::{DistanceSettings, Distrust};
 use crate::width_control::target::Knot;
 

@@ -1,7 +1,7 @@
 //! The extruder side through the controller: a link that goes and comes, and
 //! bead after bead.
 
-use crate::control::tests::*;
+use super::*;
 use crate::core::units::{Mm2, Rpm};
 use crate::extruder::law::{Constant, Played};
 use crate::extruder::{

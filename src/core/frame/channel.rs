@@ -137,7 +137,7 @@ impl FromStr for Channel {
 
 #[cfg(test)]
 mod tests {
-    use crate::core::frame::channel::*;
+    use super::*;
 
     #[test]
     fn luma_keeps_grey_grey_at_both_depths() {

@@ -161,9 +161,9 @@ fn frame_number(text: &str, files: &[PathBuf]) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::core::frame::{Frame, Pixels};
     use crate::core::time::Stamp;
-    use crate::drivers::camera::folder::*;
 
     fn folder_of(names: &[&str]) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();

@@ -198,8 +198,8 @@ fn delay_after(failures: u32) -> Duration {
 #[cfg(test)]
 mod tests {
     use super::worker::put;
+    use super::*;
     use crate::core::frame::Pixels;
-    use crate::drivers::camera::live::*;
     use crossbeam_channel::{Receiver, Sender, bounded};
     use std::sync::atomic::{AtomicU64, Ordering};
 

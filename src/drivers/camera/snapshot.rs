@@ -129,8 +129,8 @@ impl FrameSource for Snapshot {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::core::frame::{Frame, Pixels};
-    use crate::drivers::camera::snapshot::*;
     use std::io::{Read, Write};
     use std::net::TcpListener;
     use std::thread;

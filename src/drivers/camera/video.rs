@@ -96,7 +96,7 @@ impl FrameSource for VideoFile {
 
 #[cfg(test)]
 mod tests {
-    use crate::drivers::camera::video::*;
+    use super::*;
     use std::fs;
 
     /// Uncompressed AVI of grey pictures of 16x8 px, with as many frames as

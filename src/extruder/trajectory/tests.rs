@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-use crate::extruder::trajectory::*;
+use super::*;
 
 /// 100 mm/s for a second, down to 20 mm/s within a second, then 20 mm/s for a second.
 fn text() -> String {

@@ -11,8 +11,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 
 use super::whiten::{Place, Whitener};
+use super::*;
 use crate::core::robot::RobotMode;
-use crate::identify::camera_offset::*;
 
 const GAUGE_MM: f64 = 60.0;
 const SEARCH: Search = Search { gauge: Mm::constant(GAUGE_MM), farthest: Mm::constant(1000.0) };

@@ -113,8 +113,8 @@ fn peak(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
+    use super::*;
     use crate::numeric::lti::FirstOrder;
-    use crate::numeric::lti::margins::*;
 
     /// K 1, τ 0.84 s, L 0.41 s with a PI controller, by another tool's root finding.
     #[test]

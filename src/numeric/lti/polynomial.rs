@@ -133,7 +133,7 @@ pub fn is_hurwitz(coefficients: &[f64]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use crate::numeric::lti::polynomial::*;
+    use super::*;
 
     fn sorted(mut roots: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
         roots.sort_by(|a, b| a.re.total_cmp(&b.re).then(a.im.total_cmp(&b.im)));

@@ -89,7 +89,7 @@ fn positive(what: &'static str, value: f64) -> Result<f64, ModelError> {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-    use crate::numeric::lti::process::*;
+    use super::*;
 
     #[test]
     fn a_second_order_has_the_poles_of_its_damping() {

@@ -170,7 +170,7 @@ pub fn simulate(tf: &TransferFunction, input: &[f64], dt_s: f64) -> Result<Vec<f
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-    use crate::numeric::lti::simulate::*;
+    use super::*;
     use crate::numeric::lti::{FirstOrder, SecondOrder};
 
     fn fopdt(dead_time_s: f64) -> TransferFunction {

@@ -219,7 +219,7 @@ impl TransferFunction {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-    use crate::numeric::lti::transfer::*;
+    use super::*;
 
     /// Screw speed over drive voltage.
     fn drive() -> TransferFunction {

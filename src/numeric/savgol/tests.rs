@@ -6,7 +6,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::numeric::savgol::*;
+use super::*;
 
 /// From an independent implementation.
 const PUBLISHED: &str = include_str!("coefficients.txt");

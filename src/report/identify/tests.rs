@@ -2,10 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
+use super::*;
 use crate::core::quantity::Unit;
 use crate::identify::experiment::Rules;
 use crate::identify::fit::DeadTime;
-use crate::report::identify::*;
 use crate::sim::logged::{self, Logged};
 
 fn experiment(log: &Logged) -> Experiment {

@@ -1,7 +1,7 @@
+use super::*;
 use crate::core::frame::Pixels;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
-use crate::report::image::*;
 use crate::rows::frame_row::sample;
 use crate::vision::{Axis, Polarity};
 

@@ -68,7 +68,7 @@ pub fn on(status: &str) -> (&'static str, &'static str) {
 
 #[cfg(test)]
 mod tests {
-    use crate::report::run::advice::*;
+    use super::*;
     use crate::vision::Reject;
 
     #[test]

@@ -114,7 +114,7 @@ fn places(step: f64) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use crate::report::run::axis::*;
+    use super::*;
 
     fn labels(scale: Scale, wanted: u32) -> Vec<String> {
         scale.ticks(wanted).into_iter().map(|tick| tick.1).collect()

@@ -45,7 +45,7 @@ pub fn has_marks(strip: &Strip) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use crate::report::run::legend::*;
+    use super::*;
     use crate::report::run::strip::Mark;
 
     #[test]

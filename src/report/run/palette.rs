@@ -116,7 +116,7 @@ pub fn variables() -> String {
 
 #[cfg(test)]
 mod tests {
-    use crate::report::run::palette::*;
+    use super::*;
 
     #[test]
     fn every_thing_has_a_name_of_its_own() {

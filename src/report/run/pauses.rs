@@ -81,8 +81,8 @@ fn draw(layer: &Drawn<'_>, x: &Scale, y: &Scale) -> Markup {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::report::run::palette;
-    use crate::report::run::pauses::*;
 
     #[test]
     fn every_pause_has_its_place() {

@@ -162,8 +162,8 @@ fn append(path: &mut String, command: char, (x, y): Point) {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::report::run::palette;
-    use crate::report::run::plot::*;
 
     fn series(points: &[Point]) -> Series {
         let mut series = Series::default();

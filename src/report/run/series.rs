@@ -133,9 +133,18 @@ pub fn unbroken(points: &[Point]) -> Vec<&[Point]> {
         .collect()
 }
 
+/// Points as a curve that can be drawn.
+pub fn series(points: &[(f64, f64)]) -> Series {
+    let mut series = Series::default();
+    for (x, y) in points {
+        series.push(*x, *y);
+    }
+    series
+}
+
 #[cfg(test)]
 mod tests {
-    use crate::report::run::series::*;
+    use super::*;
     use proptest::prelude::*;
 
     #[test]

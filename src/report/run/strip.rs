@@ -77,7 +77,7 @@ impl Strip {
 
 #[cfg(test)]
 mod tests {
-    use crate::report::run::strip::*;
+    use super::*;
 
     const GOOD: Mark = Mark { severity: 0, name: "good" };
     const BAD: Mark = Mark { severity: 1, name: "bad" };

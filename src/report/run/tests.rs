@@ -58,7 +58,7 @@ fn frames_without_a_controller_have_only_what_applies() {
 #[test]
 fn a_run_without_a_frame_still_has_a_page() {
     let (summary, page) = page_of("nothing", |folder| {
-        crate::rows::log::RunLog::create(synthetic::options(folder, "Nothing", true))
+        crate::report::run::RunPage::log(synthetic::options(folder, "Nothing", true))
             .unwrap()
             .finish()
             .unwrap()
@@ -80,7 +80,7 @@ fn hours_make_a_page_no_larger_than_minutes() {
 fn the_page_says_what_to_improve_about_light_and_lens() {
     let (_, page) = page_of("light", |folder| {
         let options = synthetic::options(folder, "Blurred", false);
-        let mut log = crate::rows::log::RunLog::create(options).unwrap();
+        let mut log = crate::report::run::RunPage::log(options).unwrap();
         let mut measured = crate::rows::frame_row::sample::measured(42.0, 0.02);
         measured.hints.blur_px = 4.1;
         for frame in 0..20 {

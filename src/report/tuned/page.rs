@@ -10,8 +10,8 @@ use crate::report::run::legend::legend;
 use crate::report::run::palette::{CONTENDERS, Ink, LIMIT, MODEL, SETPOINT, SPEED, TARGET, WIDTH};
 use crate::report::run::plot::{Layer, Plot, y_range};
 use crate::report::run::series::Series;
+use crate::report::run::series::series;
 use crate::report::run::whole_page;
-use crate::studies::reproduce::series;
 use crate::tune::predict::{FLOW_STEP, Prediction, SEEDS};
 
 /// Time of the robot's answer that is shown about its steps \[s\].

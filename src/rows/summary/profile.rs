@@ -68,8 +68,8 @@ impl ProfileTally {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::extruder::ExtruderHold;
-    use crate::rows::summary::profile::*;
 
     #[test]
     fn a_profile_that_a_bead_cuts_off_and_one_that_a_bead_outlasts_are_told() {

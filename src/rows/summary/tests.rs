@@ -1,8 +1,8 @@
+use super::*;
 use crate::control::step::{Command, Fault, Hold, State, Trace};
 use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::units::MmPerS;
 use crate::rows::frame_row::{ControlColumns, sample};
-use crate::rows::summary::*;
 use crate::width_control::limiter::Limit;
 
 const TARGET: Mm = Mm::constant(42.0);

@@ -1,6 +1,6 @@
+use super::*;
 use crate::core::units::{Mm, MmPerS};
 use crate::rows::frame_row::sample;
-use crate::rows::widths::*;
 use crate::width_control::limiter::Limit;
 
 fn rows_of(with_control: bool, rows: &[FrameRow]) -> Vec<String> {

@@ -75,7 +75,7 @@ fn gauge(scene: &Scene, knows_gamma: bool) -> Gauge {
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::accuracy::drawn::*;
+    use super::*;
 
     #[test]
     fn a_frame_depends_on_set_and_number_alone() {

@@ -231,7 +231,7 @@ pub fn markdown(figures: &[RoughnessFigures]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::accuracy::roughness_table::*;
+    use super::*;
 
     #[test]
     fn limits_are_those_of_medians_and_of_widths_against_the_own_mean() {

@@ -121,7 +121,7 @@ impl Set {
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::accuracy::sets::*;
+    use super::*;
     use std::collections::BTreeSet;
 
     fn set(name: &str) -> Set {

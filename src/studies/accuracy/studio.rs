@@ -102,8 +102,8 @@ fn tilted() -> Calibration {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::studies::accuracy::sets::all;
-    use crate::studies::accuracy::studio::*;
 
     #[test]
     fn pictures_are_of_their_set_and_frame_and_have_a_truth() {

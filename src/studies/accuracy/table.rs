@@ -91,8 +91,8 @@ pub(super) fn marked<const N: usize>(
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::studies::accuracy::sets;
-    use crate::studies::accuracy::table::*;
 
     #[test]
     fn tables_have_a_line_a_set_and_all_columns() {

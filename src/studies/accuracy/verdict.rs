@@ -96,7 +96,7 @@ pub fn misses(limits: &Limits, figures: &SetFigures) -> Vec<Miss> {
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::accuracy::verdict::*;
+    use super::*;
 
     fn figures() -> SetFigures {
         SetFigures {

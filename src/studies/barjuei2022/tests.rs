@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use super::*;
 use crate::cell::file::{Cell, Purpose, RunPart};
 use crate::core::units::Mm;
 use crate::sim::trial::Trial;
-use crate::studies::barjuei2022::*;
 use crate::vision::Method;
 
 fn cell() -> (Cell, RunPart) {

@@ -160,7 +160,7 @@ fn spread(values: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::bcs_thesis::bounds::*;
+    use super::*;
 
     /// Four standard errors of a standard deviation from 40 fits.
     fn near_the_bound(bound: &Bound) -> bool {

@@ -198,7 +198,7 @@ impl Scenario {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-    use crate::studies::bcs_thesis::corner::*;
+    use super::*;
 
     #[test]
     fn the_constant_extruder_lays_what_the_closed_form_says() {

@@ -182,7 +182,7 @@ fn excitation(number: u64) -> Result<Vec<f64>, NoSuchLength> {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-    use crate::studies::bcs_thesis::fit_table::*;
+    use super::*;
 
     #[test]
     fn the_published_table_comes_out_within_two_points() {

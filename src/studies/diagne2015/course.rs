@@ -115,7 +115,7 @@ fn pass(pair: &[Sample], level: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::diagne2015::course::*;
+    use super::*;
 
     fn course(plug: impl Fn(f64) -> f64) -> Course {
         let sample = |k: u32| {

@@ -129,8 +129,8 @@ fn soonest(screw: &Screw, first_effect_s: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::studies::diagne2015::CASES;
-    use crate::studies::diagne2015::experiment::*;
 
     /// σ0, open loop, swing and its period, informed and uninformed predictor.
     const KNOWN: [[f64; 6]; 3] = [

@@ -91,7 +91,7 @@ pub fn suffer(
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::diagne2015::robustness::*;
+    use super::*;
     use crate::studies::diagne2015::{CASES, paper_law, saturated};
 
     #[test]

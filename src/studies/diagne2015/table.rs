@@ -16,7 +16,8 @@ use crate::report::run::palette::Ink;
 use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
 use crate::report::run::sections::legend;
 use crate::report::run::series::Series;
-use crate::studies::reproduce::{ReproduceError, Reproduced, Rows, Section, Source, series};
+use crate::report::run::series::series;
+use crate::studies::reproduce::{ReproduceError, Reproduced, Rows, Section, Source};
 
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 4;

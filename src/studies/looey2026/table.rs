@@ -10,10 +10,9 @@ use crate::report::run::palette;
 use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
 use crate::report::run::sections::legend;
 use crate::report::run::series::Series;
+use crate::report::run::series::series;
 use crate::studies::looey2026 as experiments;
-use crate::studies::reproduce::{
-    Effort, ReproduceError, Reproduced, Rows, Section, Source, series,
-};
+use crate::studies::reproduce::{Effort, ReproduceError, Reproduced, Rows, Section, Source};
 
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 14;

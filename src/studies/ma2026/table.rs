@@ -260,7 +260,7 @@ fn worst(tried: Tried) -> Result<f64, ReproduceError> {
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::ma2026::table::*;
+    use super::*;
 
     #[test]
     fn every_published_figure_has_a_row_with_what_both_laws_give() {

@@ -1,5 +1,5 @@
 use super::course::mean;
-use crate::studies::ma2026::*;
+use super::*;
 
 fn step(tried: Tried, factors: Factors) -> StepFigures {
     Experiment::step(factors).run(tried).unwrap().step_figures()

@@ -108,7 +108,7 @@ pub fn markup(sources: &[Reproduced]) -> Markup {
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::reproduce::summary::*;
+    use super::*;
 
     fn row(published: Option<f64>, simulated: Option<f64>) -> Row {
         let (seed, case, quantity) = ("ma2026", "step".to_owned(), "overshoot");

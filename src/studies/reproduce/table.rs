@@ -70,7 +70,7 @@ pub fn number(value: Option<f64>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::reproduce::table::*;
+    use super::*;
 
     #[test]
     fn nothing_is_not_less_than_nothing() {

@@ -106,8 +106,8 @@ impl Colour {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::sim::hash;
-    use crate::width_control::distance::colour::*;
 
     const GAUGE_MM: f64 = 12.0;
     const STEP_MM: f64 = 2.0;

@@ -236,7 +236,7 @@ fn shrunk(spread: [f64; 3], gain: [f64; 2], slopes: [f64; 2], noise: f64) -> [f6
 
 #[cfg(test)]
 mod tests {
-    use crate::width_control::distance::level::*;
+    use super::*;
 
     fn sight(ln_width: f64, ln_speed: f64) -> Sight {
         Sight { ln_width, ln_speed, cover: 1.0, old_ln_width: 0.0, variance: 1e-6 }

@@ -156,7 +156,7 @@ impl Guess {
 
 #[cfg(test)]
 mod tests {
-    use crate::width_control::distance::offset_belief::*;
+    use super::*;
 
     /// A bead of exponent 0.25 whose speed steps once, seen `offset` behind the
     /// nozzle by a law that was told 88.4 mm.

@@ -130,7 +130,7 @@ impl Unrest {
 
 #[cfg(test)]
 mod tests {
-    use crate::width_control::distance::pairing::*;
+    use super::*;
 
     fn trail() -> Trail {
         let mut trail = Trail::new(100.0, 1e3);

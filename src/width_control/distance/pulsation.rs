@@ -117,8 +117,8 @@ impl Pulsation {
 mod tests {
     use std::f64::consts::TAU;
 
+    use super::*;
     use crate::sim::hash;
-    use crate::width_control::distance::pulsation::*;
 
     fn watch(seconds: u32, rate_hz: u32, wave: impl Fn(f64) -> f64) -> (Pulsation, f64) {
         let mut pulsation = Pulsation::new();

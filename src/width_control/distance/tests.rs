@@ -1,7 +1,7 @@
 //! The law on a bead whose truth is known.
 
+use super::*;
 use crate::sim::hash;
-use crate::width_control::distance::*;
 
 /// A robot that does at once what it is told, and a bead of a power of its
 /// speed times a flow.

@@ -109,7 +109,7 @@ impl Tone {
 
 #[cfg(test)]
 mod tests {
-    use crate::width_control::distance::tone::*;
+    use super::*;
 
     #[test]
     fn a_pulsation_of_its_period_is_foretold() {

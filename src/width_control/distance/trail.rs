@@ -228,7 +228,7 @@ impl Trail {
 
 #[cfg(test)]
 mod tests {
-    use crate::width_control::distance::trail::*;
+    use super::*;
 
     /// A robot that drives at one speed and changes to another at once, after
     /// 1.03 s, with reports every 0.1 s.

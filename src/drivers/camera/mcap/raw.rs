@@ -67,7 +67,7 @@ fn rows(image: &RawImage, pixel_bytes: usize) -> Result<Vec<u8>, String> {
 
 #[cfg(test)]
 mod tests {
-    use crate::drivers::camera::mcap::raw::*;
+    use super::*;
 
     fn image(encoding: &str, (width, height, step): (u32, u32, u32), data: &[u8]) -> RawImage {
         RawImage {

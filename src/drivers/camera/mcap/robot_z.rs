@@ -33,9 +33,9 @@ impl RobotZ {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::core::robot::{RobotMode, RobotState};
     use crate::core::units::MmPerS;
-    use crate::drivers::camera::mcap::robot_z::*;
 
     #[test]
     fn the_newest_state_counts() {

@@ -2,13 +2,13 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use super::*;
 use crate::cell::file::KeepFrames;
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::frame::Pixels;
 use crate::core::robot::{RobotMode, RobotState};
 use crate::core::units::{Mm, MmPerS};
-use crate::drivers::camera::mcap::*;
 use crate::io::foxglove::timestamp;
 use crate::io::record::{RecordConfig, start};
 use crate::run::ports::Recorder;

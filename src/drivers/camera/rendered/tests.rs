@@ -1,10 +1,10 @@
+use super::*;
 use crate::calibration::Calibration;
 use crate::cell::Source;
 use crate::core::frame::Frame;
 use crate::core::geometry::Roi;
 use crate::core::robot::RobotMode;
 use crate::core::units::{Mm, MmPerS};
-use crate::drivers::camera::rendered::*;
 use crate::scenario::bead::{BeadModel, Roughness};
 use crate::scenario::disturbance::Flow;
 use crate::scenario::image::Picture;

@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-use crate::numeric::lti::discrete::*;
+use super::*;
 use crate::numeric::lti::{FirstOrder, Simulator, simulate};
 
 struct Plant {

@@ -69,8 +69,8 @@ fn compress(pixels: &[u8], (width, height): (usize, usize), quality: u8) -> Opti
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::sim::hash;
-    use crate::studies::accuracy::drawn::camera::*;
 
     #[test]
     fn gamma_and_vignetting_are_as_defined() {

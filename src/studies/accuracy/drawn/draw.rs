@@ -83,7 +83,7 @@ impl Draw {
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::accuracy::drawn::draw::*;
+    use super::*;
 
     #[test]
     fn numbers_are_uniform_in_their_logarithm() {

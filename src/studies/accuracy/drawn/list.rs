@@ -122,7 +122,7 @@ pub fn named(name: &str) -> Vec<DrawnSet> {
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::accuracy::drawn::list::*;
+    use super::*;
 
     #[test]
     fn a_name_names_a_set_or_a_family() {

@@ -102,7 +102,7 @@ impl LongBead {
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::accuracy::drawn::long_bead::*;
+    use super::*;
 
     #[test]
     fn frames_of_one_bead_show_what_lies_within_their_rows() {

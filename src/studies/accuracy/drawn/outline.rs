@@ -202,7 +202,7 @@ fn dig(dug: &Holes, bead: Straight, lines: usize, draw: &mut Draw) -> Vec<Disc> 
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::accuracy::drawn::outline::*;
+    use super::*;
     use crate::studies::accuracy::drawn::profile::PER_PX;
     use crate::studies::accuracy::drawn::scene::Tear;
 

@@ -30,7 +30,7 @@ pub fn rough(count: usize, roughness_px: f64, length_px: f64, draw: &mut Draw) -
 
 #[cfg(test)]
 mod tests {
-    use crate::studies::accuracy::drawn::profile::*;
+    use super::*;
 
     #[test]
     fn roughness_and_length_are_those_asked_for() {

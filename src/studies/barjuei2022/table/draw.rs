@@ -6,9 +6,9 @@ use crate::report::run::area::{Area, XAxis};
 use crate::report::run::palette;
 use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
 use crate::report::run::sections::legend;
+use crate::report::run::series::series;
 use crate::sim::score::Score;
 use crate::studies::barjuei2022::StandOff;
-use crate::studies::reproduce::series;
 use crate::width_control::limiter::Limits;
 
 /// A layer by the paper's loop and by distance: widths and speeds over path.

@@ -1,5 +1,5 @@
+use super::*;
 use crate::extruder::feedforward::share_left;
-use crate::studies::bcs_thesis::on_off::*;
 
 /// Off over on, mean of five seeds and the smallest.
 fn ratio(share: f64, control: Control) -> (f64, f64) {

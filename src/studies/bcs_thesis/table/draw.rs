@@ -8,11 +8,11 @@ use crate::report::run::palette;
 use crate::report::run::palette::Ink;
 use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
 use crate::report::run::sections::legend;
+use crate::report::run::series::series;
 use crate::studies::bcs_thesis as plant;
 use crate::studies::bcs_thesis::corner::{BEAD, Drive, JUDGED_MM, Row};
 use crate::studies::bcs_thesis::fit_table::{FitRow, FitTable};
 use crate::studies::bcs_thesis::on_off::{Compared, Run};
-use crate::studies::reproduce::series;
 
 /// What is drawn once more, more closely \[s\].
 const CLOSER_S: (f64, f64) = (40.0, 60.0);

@@ -8,8 +8,8 @@ use crate::report::run::palette::Ink;
 use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
 use crate::report::run::sections::legend;
 use crate::report::run::series::Series;
+use crate::report::run::series::series;
 use crate::studies::ma2026::{Course, Factors};
-use crate::studies::reproduce::series;
 
 /// Ticks from point to point of a drawing.
 const DRAWN_EVERY: usize = 4;

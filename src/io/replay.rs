@@ -94,9 +94,9 @@ fn same_bits(a: &Step, b: &Step) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::control::step::{State, Trace};
     use crate::core::units::Mm;
-    use crate::run::replay::*;
 
     /// A controller with memory: the error is the sum of what it has seen.
     fn controller() -> impl FnMut(Stamp, &Event) -> Step {
