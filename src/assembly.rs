@@ -19,7 +19,6 @@ use crate::io::calibration_file;
 use crate::io::record::ExtruderFile;
 use crate::sim::cell::Rig;
 use crate::sim::extruder::SimExtruder;
-use crate::width_control::settings::WidthLaw;
 
 /// The extruder side of a cell that is commanded.
 #[derive(Debug, Clone)]
@@ -101,7 +100,7 @@ impl LoadedCell {
         let Some(run) = &self.cell.run else { return Ok(()) };
         let half = self.cell.gauge_length(&self.calibration) * 0.5;
         let offset = run.camera.offset;
-        if offset >= half || !matches!(run.control.law, WidthLaw::Distance(_)) {
+        if offset >= half || !run.control.strategy.sees_only_laid_bead() {
             return Ok(());
         }
         Err(AssemblyError::unfit(format!(

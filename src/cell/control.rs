@@ -5,20 +5,12 @@ use crate::core::units::{Mm, MmPerS, MmPerS2};
 use crate::document::Table;
 use crate::width_control::limiter::Limits;
 use crate::width_control::pi::PiGains;
-use crate::width_control::settings::{Control, Exponent, WidthLaw};
+use crate::width_control::settings::Control;
+use crate::width_control::strategy::STRATEGIES;
 use crate::width_control::target::{Knot, Layers, Target};
 
 /// Fastest that any robot of this kind moves, as a bound on typing errors.
 const ANY_SPEED: std::ops::RangeInclusive<f64> = 0.0..=10_000.0;
-
-/// How far the flow wanders along a metre of path unless the file says so, as a
-/// share.
-const DRIFT_PER_ROOT_M: f64 = 0.0055;
-
-/// Change of the speed in a course of steps, as a share, and what it may be.
-const STEP_SHARE: f64 = 0.1;
-/// Shares that a step may have: less shows in no width, more is no small step.
-pub const STEP_SHARES: std::ops::RangeInclusive<f64> = 0.02..=0.3;
 
 /// Keys of the PI law's gains, and what they may be.
 const GAINS: [&str; 2] = ["kp_per_s", "ki_per_s2"];
@@ -29,34 +21,22 @@ pub fn read_target(control: &Table<'_>) -> Option<Mm> {
     control.number("target_width_mm", 0.1..=1000.0).and_then(|v| Mm::new(v).ok())
 }
 
-/// The law that a cell names.
-#[derive(Debug, Clone, Copy)]
-enum Named {
-    Pi,
-    Distance,
-    Steps,
-}
-
 /// The rest of `[control]`. There are no defaults for gains, nor for the
 /// exponent.
 pub fn read_control(control: &Table<'_>, target: Option<Target>) -> Option<Control> {
-    let laws = [("pi", Named::Pi), ("distance", Named::Distance), ("steps", Named::Steps)];
-    let law = control.required_choice("law", &laws);
+    let names = STRATEGIES.map(|strategy| (strategy.name, strategy));
+    let strategy = control.required_choice("law", &names);
     let gains = read_gains(control);
-    // A law that is but fallen back to, or not followed, may be without gains.
-    let spared = matches!(law, Some(Named::Distance | Named::Steps))
+    // PI control that is but fallen back to, or not used, may be without gains.
+    let spared = strategy.is_some_and(|strategy| !strategy.needs_gains)
         && !GAINS.iter().any(|key| control.has(key));
     if !spared {
         for key in GAINS.iter().filter(|key| !control.has(key)) {
             control.absent(key, "a number; there are no defaults for gains");
         }
     }
-    let law = match law {
-        Some(Named::Distance) => read_exponent(control).map(WidthLaw::Distance),
-        Some(Named::Pi) => Some(WidthLaw::Pi),
-        Some(Named::Steps) => {
-            control.number_or("step_share", STEP_SHARES, STEP_SHARE).map(WidthLaw::Steps)
-        }
+    let strategy = match strategy {
+        Some(strategy) => (strategy.read)(control),
         None => {
             control.pass_over();
             None
@@ -66,7 +46,7 @@ pub fn read_control(control: &Table<'_>, target: Option<Target>) -> Option<Contr
     let max_hold = control.number("max_hold_s", 0.1..=3600.0);
     Some(Control {
         target: target?,
-        law: law?,
+        strategy: strategy?,
         gains: if spared { None } else { Some(gains?) },
         max_gap: Span::from_secs(max_gap?),
         max_hold: Span::from_secs(max_hold?),
@@ -79,24 +59,6 @@ fn read_gains(control: &Table<'_>) -> Option<PiGains> {
     let unit = control.number_or("error_unit_mm", 1e-4..=1e3, 1.0)?;
     let [kp, ki] = GAINS.map(|key| control.optional_number(key, ANY_GAIN));
     Some(PiGains { kp_per_s: kp? / unit, ki_per_s2: ki? / unit })
-}
-
-fn read_exponent(control: &Table<'_>) -> Option<Exponent> {
-    let value = control.number("exponent", 0.02..=2.0);
-    let learns = control.choice("exponent_learns", &[("yes", true), ("no", false)]);
-    let drift = control.number_or("drift_per_root_m", 1e-5..=1.0, DRIFT_PER_ROOT_M);
-    Some(Exponent { value: value?, learns: learns?, drift_per_root_m: drift? })
-}
-
-/// Refuses steps that leave the speeds that setpoints may have.
-pub fn check_steps(control: &Table<'_>, law: WidthLaw, start: MmPerS, limits: Limits) {
-    let WidthLaw::Steps(share) = law else { return };
-    let (slow, fast) = (start * (1.0 - share), start * (1.0 + share));
-    if slow < limits.min_speed || fast > limits.max_speed {
-        let (low, high) = (limits.min_speed, limits.max_speed);
-        let found = format!("{share}, which is {:.1} to {:.1} mm/s", slow.get(), fast.get());
-        control.report("step_share", found, format!("speeds within [limits], {low} to {high}"));
-    }
 }
 
 /// Reports a target that the gauge would refuse as no width of the bead's. `layers` is the

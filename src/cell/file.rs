@@ -20,8 +20,7 @@ use crate::scenario::table;
 use crate::scenario::table::{Level, Simulation};
 use crate::vision::Gauge;
 use crate::width_control::limiter::Limits;
-use crate::width_control::settings::{Control, WidthLaw};
-use crate::width_control::steps::StepSettings;
+use crate::width_control::settings::Control;
 use crate::width_control::target::Target;
 
 pub use super::extruder::ExtruderPart;
@@ -46,7 +45,7 @@ pub enum Purpose {
 }
 
 /// A cell that has been read and found sound.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Cell {
     /// Where the calibration comes from.
     pub calibration: CalibrationSource,
@@ -75,7 +74,7 @@ pub struct Cell {
 }
 
 /// What a run needs beyond measuring.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct RunPart {
     /// The width controller.
     pub control: Control,
@@ -153,19 +152,6 @@ impl Cell {
     }
 }
 
-impl Cell {
-    /// The course of steps that the cell asks for.
-    pub fn steps(&self, run: &RunPart, calibration: &Calibration) -> Option<StepSettings> {
-        let WidthLaw::Steps(share) = run.control.law else { return None };
-        Some(StepSettings {
-            start_speed: run.robot.start_speed,
-            share,
-            reach: run.camera.offset + self.gauge_length(calibration) * 0.5,
-            width_range: self.gauge.width_range,
-        })
-    }
-}
-
 fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let calibration = root.required_table("calibration");
     let calibration_source = calibration.as_ref().and_then(|t| read_calibration(t, folder));
@@ -196,7 +182,7 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     if let (Some(table), Some(control), Some(limits), Some(robot)) =
         (&control_table, &control, limits, &robot)
     {
-        control::check_steps(table, control.law, robot.start_speed, limits);
+        control.strategy.check(table, robot.start_speed, limits);
     }
     let simulation = table::read(root);
     let speed = robot.as_ref().map(|robot| robot.start_speed);

@@ -17,7 +17,7 @@ use crate::cell::file::{Purpose, RunPart, Source};
 use crate::core::time::Span;
 use crate::core::units::Mm;
 use crate::extruder::start_stop::Pause;
-use crate::width_control::settings::WidthLaw;
+use crate::width_control::strategy::distance::DistanceStrategy;
 
 /// Ratio of speeds in one cell that nobody means.
 const UNLIKELY: f64 = 200.0;
@@ -267,9 +267,9 @@ fn about_law(loaded: &LoadedCell, run: &RunPart) {
             steps.length().get() / 1e3
         );
     }
-    let WidthLaw::Distance(told) = run.control.law else { return };
-    let learnt = if told.learns { ", learnt as the bead is laid" } else { "" };
-    say!("  law          by distance, b = {}{learnt}", told.value);
+    let Some(told) = run.control.strategy.as_kind::<DistanceStrategy>() else { return };
+    let learnt = if told.learns_exponent { ", learnt as the bead is laid" } else { "" };
+    say!("  law          by distance, b = {}{learnt}", told.exponent);
     let gauge = loaded.cell.gauge_length(&loaded.calibration);
     say!(
         "               gauge {:.1} mm long, {:.1} ± {:.1} mm behind the nozzle",

@@ -13,11 +13,11 @@ use clap::{Args, ValueEnum};
 use super::offset::recording::farthest;
 use super::{Voice, WrongArguments};
 use crate::assembly::LoadedCell;
-use crate::cell::control::STEP_SHARES;
 use crate::cell::file::Purpose;
 use crate::core::units::Mm;
 use crate::report::tuned::Tuned;
 use crate::rows::output;
+use crate::width_control::strategy::steps::STEP_SHARES;
 
 /// Finds what a cell is like from steps of its speed, and proposes settings.
 #[derive(Debug, Args)]

@@ -1,25 +1,13 @@
 //! The extruder side of a controller: what it hears of the robot's, and what
 //! it answers.
 
-use std::sync::Arc;
-
+use super::controller::Controller;
 use super::event::Event;
+use super::extruder_side::ExtruderSide;
+use super::phase::{Phase, Segment};
 use super::step::ExtruderStep;
-use super::{Controller, Phase, Stretch};
 use crate::core::time::Stamp;
-use crate::extruder::trajectory::{Planned, PlannedJob};
-use crate::extruder::{ExtruderFault, ExtruderState, FlowDemand, Laying, Supervisor};
-
-/// The extruder side of a controller, where a cell has one.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct ExtruderSide {
-    pub(super) supervisor: Supervisor,
-    pub(super) demand: FlowDemand,
-    /// The job that was planned, if there is one.
-    pub(super) plan: Option<Arc<PlannedJob>>,
-    /// What was planned for the last place on this bead that was known.
-    pub(super) planned: Option<Planned>,
-}
+use crate::extruder::Laying;
 
 impl Controller {
     /// The extruder side's answer to what concerns it.
@@ -29,8 +17,8 @@ impl Controller {
             side.planned = planned.or(side.planned);
         }
         let laying = self.laying(now);
-        if matches!(laying, Laying::Ending(_)) {
-            self.stretch = Stretch::Ending;
+        if let (Laying::Ending(_), Some(bead)) = (&laying, self.phase.bead_mut()) {
+            bead.segment = Segment::Ending;
         }
         let ExtruderSide { supervisor, planned, .. } = self.extruder.as_mut()?;
         let planned = planned.map(|planned| planned.command);
@@ -62,35 +50,26 @@ impl Controller {
         let Some(ExtruderSide { demand, supervisor, planned, .. }) = &self.extruder else {
             return Laying::Idle;
         };
-        match &self.phase {
-            Phase::Idle => Laying::Idle,
-            Phase::Fault { .. } => Laying::Stopped,
-            _ if self.ended => Laying::Stopped,
-            // Nobody knows what a robot does that is not heard, but by then it has
-            // stopped.
-            _ if self.heard.not_since.is_some_and(|since| now - since > self.setup.alone_for) => {
-                Laying::Stopped
-            }
-            Phase::Priming | Phase::Tracking { .. } | Phase::Holding { .. } => {
-                let told = self.told.map_or(self.setup.start_speed, |(_, speed)| speed);
-                // No extruder keeps up with a robot that starts; it is ready for
-                // the speed that comes. Nor does it follow a robot that goes by its flow.
-                let goes_ahead = self.stretch == Stretch::RunUp || supervisor.is_passing();
-                let robot = self.robot.filter(|_| !goes_ahead);
-                let robot = robot.map(|robot| (told, robot.speed_mm_per_s));
-                let flow = planned.map_or_else(|| demand.wanted(robot), |planned| planned.flow);
-                let way = supervisor.way_of_stop(told);
-                let stops = self.stretch == Stretch::Ending
-                    || self.left(now).zip(way).is_some_and(|(left, way)| left <= way);
-                if stops { Laying::Ending(flow) } else { Laying::Bead(flow) }
-            }
+        let bead = match &self.phase {
+            Phase::Idle => return Laying::Idle,
+            Phase::Ended { .. } => return Laying::Stopped,
+            Phase::Bead(bead) if bead.is_faulty() => return Laying::Stopped,
+            Phase::Bead(bead) => bead,
+        };
+        // Nobody knows what a robot does that is not heard, but by then it has stopped.
+        if self.robot.silent_since.is_some_and(|since| now - since > self.setup.alone_for) {
+            return Laying::Stopped;
         }
-    }
-
-    pub(super) fn extruder_fault(&self) -> Option<ExtruderFault> {
-        match self.extruder.as_ref()?.supervisor.state() {
-            ExtruderState::Fault(why) => Some(why),
-            _ => None,
-        }
+        let requested = bead.setpoint.map_or(self.setup.start_speed, |last| last.speed);
+        // No extruder keeps up with a robot that starts; it is ready for
+        // the speed that comes. Nor does it follow a robot that goes by its flow.
+        let goes_ahead = bead.segment == Segment::RunUp || supervisor.is_passing();
+        let robot = self.robot.state.filter(|_| !goes_ahead);
+        let robot = robot.map(|robot| (requested, robot.speed_mm_per_s));
+        let flow = planned.map_or_else(|| demand.wanted(robot), |planned| planned.flow);
+        let way = supervisor.way_of_stop(requested);
+        let stops = bead.segment == Segment::Ending
+            || self.left(now).zip(way).is_some_and(|(left, way)| left <= way);
+        if stops { Laying::Ending(flow) } else { Laying::Bead(flow) }
     }
 }

@@ -1,13 +1,12 @@
 //! A job that robot and extruder were planned for together, bead by bead.
 
-use super::{Controller, ExtruderSide};
+use super::controller::Controller;
+use super::extruder_side::{ExtruderSide, NO_OVERRIDE};
 use crate::core::readback::ROBOT_LAG;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::extruder::trajectory::{Planned, PlannedCourse};
 
-/// The pace of a robot that goes by nothing but the width.
-pub(super) const UNPACED: f64 = 1.0;
 /// Share of its plan from which a bead was laid: the robot's last report comes a little
 /// before its end.
 const WHOLE: f64 = 0.9;
@@ -16,17 +15,17 @@ impl Controller {
     /// The plan of the bead that is being laid.
     fn course(&self) -> Option<&PlannedCourse> {
         let plan = self.extruder.as_ref()?.plan.as_ref()?;
-        Some(plan.bead(self.beads).as_ref())
+        Some(plan.bead(self.bead.number).as_ref())
     }
 
     /// The next bead begins. One that was broken off, by whatever it was, is laid again:
     /// no robot says which bead of its program it begins.
     pub(super) fn next_bead(&mut self) {
-        let laid = self.laid;
+        let laid = self.bead.laid;
         if self.course().is_some_and(|course| laid >= course.end() * WHOLE) {
-            self.beads += 1;
+            self.bead.number += 1;
         }
-        self.laid = Mm::ZERO;
+        self.bead.laid = Mm::ZERO;
         if let Some(side) = &mut self.extruder {
             side.planned = None;
         }
@@ -34,16 +33,17 @@ impl Controller {
 
     /// What is planned for where the nozzle is now.
     pub(super) fn planned(&self, now: Stamp) -> Option<Planned> {
-        Some(self.course()?.at(self.nozzle(now)?))
+        Some(self.course()?.at(self.laid_at(now)?))
     }
 
     /// The share of a speed of the width controller, which is one for the start speed's
     /// flow, at which a plan, a start or a stop has the robot go; none where it is not
     /// known how far along its plan the robot is.
-    pub(super) fn pace(&self, now: Stamp) -> Option<f64> {
-        let share = self.extruder.as_ref().map_or(UNPACED, |side| side.supervisor.robot_share());
+    pub(super) fn speed_override(&self, now: Stamp) -> Option<f64> {
+        let share =
+            self.extruder.as_ref().map_or(NO_OVERRIDE, |side| side.supervisor.robot_share());
         let Some(course) = self.course() else { return Some(share) };
-        let path = self.nozzle(now)? + self.robot?.speed_mm_per_s * ROBOT_LAG;
+        let path = self.laid_at(now)? + self.robot.state?.speed_mm_per_s * ROBOT_LAG;
         let planned = course.speed(path, self.setup.setpoint_period);
         Some(share * (planned / self.setup.start_speed))
     }
@@ -59,6 +59,6 @@ impl Controller {
     /// How much of the bead is left, where its length is known.
     pub(super) fn left(&self, now: Stamp) -> Option<Mm> {
         let end = self.course().map(PlannedCourse::end).or(self.setup.bead_length)?;
-        Some(end - self.nozzle(now)?)
+        Some(end - self.laid_at(now)?)
     }
 }

@@ -5,18 +5,24 @@ mod extruder;
 
 use super::*;
 use crate::core::robot::RobotLimits;
+use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::Span;
+use crate::core::time::Stamp;
 use crate::core::units::MmPerS2;
+use crate::core::units::{Mm, MmPerS};
+use crate::width_control::limiter::{Limit, Limits};
 use crate::width_control::pi::PiGains;
-use crate::width_control::settings::WidthLaw;
+use crate::width_control::settings::Control;
+use crate::width_control::strategy::pi::PiStrategy;
 use crate::width_control::target::Target;
+use std::sync::Arc;
 
 /// The cell of the 2022 paper.
 pub fn setup() -> Setup {
     Setup {
         control: Control {
             target: Target::constant(Mm::constant(42.0)),
-            law: WidthLaw::Pi,
+            strategy: Arc::new(PiStrategy),
             gains: Some(PiGains { kp_per_s: 5.925, ki_per_s2: 4.74 }),
             max_gap: Span::from_secs(0.5),
             max_hold: Span::from_secs(3.0),
@@ -32,8 +38,9 @@ pub fn setup() -> Setup {
         camera_offset: Mm::constant(88.4),
         alone_for: Span::from_millis(1600),
         setpoint_period: Span::from_millis(200),
-        distance: None,
-        steps: None,
+        camera_offset_sigma: Mm::constant(8.84),
+        gauge_length: Mm::constant(12.7),
+        width_range: (Mm::constant(20.0), Mm::constant(60.0)),
     }
 }
 

@@ -1,17 +1,21 @@
 //! Laws that are tried on a cell as it was found.
 
+use std::sync::Arc;
+
 use super::propose::{DistanceProposal, Proposal};
 use crate::cell::file::RunPart;
 use crate::width_control::pi::PiGains;
-use crate::width_control::settings::{Exponent, WidthLaw};
+use crate::width_control::strategy::Strategy;
+use crate::width_control::strategy::distance::DistanceStrategy;
+use crate::width_control::strategy::pi::PiStrategy;
 
 /// A law that is tried.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Candidate {
     /// What it is called.
     pub name: String,
-    /// Its law.
-    pub law: WidthLaw,
+    /// Its width controller.
+    pub strategy: Arc<dyn Strategy>,
     /// Gains of the PI law.
     pub gains: Option<PiGains>,
     /// The camera's distance that it is told \[mm\].
@@ -23,14 +27,17 @@ pub struct Candidate {
 impl Candidate {
     /// As the cell has it now; none where its law holds no width.
     pub fn now(run: &RunPart) -> Option<Self> {
-        let name = match run.control.law {
-            WidthLaw::Pi => "as it is now (PI)",
-            WidthLaw::Distance(_) => "as it is now (by distance)",
-            WidthLaw::Steps(_) => return None,
+        let strategy = &run.control.strategy;
+        let name = if strategy.as_kind::<PiStrategy>().is_some() {
+            "as it is now (PI)"
+        } else if strategy.as_kind::<DistanceStrategy>().is_some() {
+            "as it is now (by distance)"
+        } else {
+            return None;
         };
         Some(Self {
             name: name.to_owned(),
-            law: run.control.law,
+            strategy: Arc::clone(strategy),
             gains: run.control.gains,
             offset_mm: run.camera.offset.get(),
             offset_sigma_mm: run.camera.offset_sigma.get(),
@@ -41,7 +48,7 @@ impl Candidate {
     pub fn pi(proposal: &Proposal) -> Self {
         Self {
             name: "proposed PI".to_owned(),
-            law: WidthLaw::Pi,
+            strategy: Arc::new(PiStrategy),
             gains: Some(proposal.pi.gains),
             offset_mm: proposal.distance.offset_mm,
             offset_sigma_mm: proposal.distance.offset_sigma_mm,
@@ -56,9 +63,9 @@ impl Candidate {
     fn of(name: &str, told: &DistanceProposal) -> Self {
         Self {
             name: name.to_owned(),
-            law: WidthLaw::Distance(Exponent {
-                value: told.exponent,
-                learns: told.learns,
+            strategy: Arc::new(DistanceStrategy {
+                exponent: told.exponent,
+                learns_exponent: told.learns,
                 drift_per_root_m: told.drift_per_root_m,
             }),
             gains: None,

@@ -1,5 +1,7 @@
 //! What each law would do on the cell as it was found: beads of the simulated cell.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -160,7 +162,7 @@ impl World {
     fn lay(&self, who: &Candidate, seed: u64) -> Result<Laid, SimError> {
         let (mut cell, mut run) = (self.cell.clone(), self.run.clone());
         cell.simulation.seed = seed + 1;
-        run.control.law = who.law;
+        run.control.strategy = Arc::clone(&who.strategy);
         run.control.gains = who.gains;
         run.camera.offset_sigma = mm(who.offset_sigma_mm);
         let factor = who.offset_mm / self.run.camera.offset.get().max(1e-9);

@@ -8,7 +8,8 @@ use super::stability::{LoopMargins, LoopPlant};
 use crate::cell::file::RunPart;
 use crate::width_control::limiter::Limits;
 use crate::width_control::pi::PiGains;
-use crate::width_control::settings::WidthLaw;
+use crate::width_control::strategy::Strategy;
+use crate::width_control::strategy::distance::DistanceStrategy;
 
 /// How far the flow is said to wander along a metre unless less is known; that of the
 /// law by distance.
@@ -60,7 +61,7 @@ pub fn propose(plant: &Plant, run: &RunPart) -> Proposal {
     let at = worst(plant, run.control.target.nominal().get(), &run.limits);
     let gains = gains(&at);
     Proposal {
-        distance: by_distance(plant, run.control.law),
+        distance: by_distance(plant, &*run.control.strategy),
         pi: PiProposal { gains, at, margins: at.margins(gains) },
     }
 }
@@ -70,7 +71,7 @@ pub fn worst(plant: &Plant, target_mm: f64, limits: &Limits) -> LoopPlant {
     LoopPlant::at(plant, target_mm, limits.min_speed.get().max(1.0))
 }
 
-fn by_distance(plant: &Plant, law: WidthLaw) -> DistanceProposal {
+fn by_distance(plant: &Plant, now: &dyn Strategy) -> DistanceProposal {
     let drift_per_root_m = match plant.scatter.drift {
         Drift::Found { per_root_m, .. } => per_root_m,
         Drift::AtMost(most) => USUAL_DRIFT.min(most),
@@ -80,7 +81,7 @@ fn by_distance(plant: &Plant, law: WidthLaw) -> DistanceProposal {
         offset_mm: plant.offset_mm.value,
         offset_sigma_mm: plant.offset_mm.sigma.max(LEAST_OFFSET_SIGMA_MM),
         drift_per_root_m: drift_per_root_m.clamp(DRIFTS.0, DRIFTS.1),
-        learns: if let WidthLaw::Distance(now) = law { now.learns } else { true },
+        learns: now.as_kind::<DistanceStrategy>().is_none_or(|now| now.learns_exponent),
     }
 }
 

@@ -1,23 +1,19 @@
 //! The width held by distance, event by event.
 
 use super::*;
-use crate::width_control::distance::{DistanceSettings, Distrust};
+use crate::width_control::distance::Distrust;
+use crate::width_control::strategy::distance::DistanceStrategy;
 use crate::width_control::target::Knot;
 
 const STEP_S: f64 = 0.05;
 
 /// The 2022 paper's cell, held by distance.
 fn by_distance() -> Setup {
-    let told = DistanceSettings {
-        offset: Mm::constant(88.4),
-        offset_sigma: Mm::constant(8.84),
-        gauge: Mm::constant(12.7),
-        reference_speed: MmPerS::constant(112.5),
-        exponent: 0.25,
-        learns_exponent: true,
-        drift_per_root_m: 0.0055,
-    };
-    Setup { distance: Some(told), setpoint_period: Span::from_secs(STEP_S), ..setup() }
+    let strategy =
+        DistanceStrategy { exponent: 0.25, learns_exponent: true, drift_per_root_m: 0.0055 };
+    let mut setup = setup();
+    setup.control.strategy = Arc::new(strategy);
+    Setup { setpoint_period: Span::from_secs(STEP_S), ..setup }
 }
 
 /// A robot that does at once what it is told, over a bead of b = 0.25.

@@ -8,6 +8,7 @@ use crate::extruder::{
     CommandLimits, Drive, ExtruderCommand, ExtruderFault, ExtruderHold, ExtruderReport,
     ExtruderState, Follows, Law, PumpMode, RobotFollows,
 };
+use crate::extruder::{ExtruderSetup, FlowDemand};
 use crate::identify::profile::{Point, Profile};
 
 const TICK_S: f64 = 0.005;

@@ -1,10 +1,12 @@
 //! Who lays the layers: the paper's loop, and the law by distance with the
 //! paper's camera and link or with faster ones.
 
+use std::sync::Arc;
+
 use crate::cell::file::{Cell, RunPart};
 use crate::core::time::Span;
 use crate::core::units::Mm;
-use crate::width_control::settings::{Exponent, WidthLaw};
+use crate::width_control::strategy::distance::DistanceStrategy;
 use crate::width_control::target::Target;
 
 /// Length of the gauge \[mm\].
@@ -63,9 +65,9 @@ impl Contender {
             cell.simulation.step = STEP;
             run.camera.rate_hz = rates.vision_hz;
             run.robot.rate_hz = rates.link_hz;
-            run.control.law = WidthLaw::Distance(Exponent {
-                value: exponent,
-                learns: true,
+            run.control.strategy = Arc::new(DistanceStrategy {
+                exponent,
+                learns_exponent: true,
                 drift_per_root_m: DRIFT,
             });
         }

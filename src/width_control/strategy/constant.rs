@@ -1,0 +1,59 @@
+//! `law = "constant"`: the robot keeps one speed, whatever is measured. What a bead does
+//! without width control, to compare with.
+
+use std::sync::Arc;
+
+use super::{CellFacts, Registration, Strategy};
+use crate::core::units::MmPerS;
+use crate::document::Table;
+use crate::width_control::controller::{
+    SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
+};
+use crate::width_control::limiter::Limits;
+
+/// A constant speed in a cell.
+pub const REGISTRATION: Registration =
+    Registration { name: "constant", needs_gains: false, read: |control| Some(read(control)?) };
+
+/// One speed for the whole bead behind its first part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConstantStrategy {
+    /// The speed.
+    pub speed: MmPerS,
+}
+
+fn read(control: &Table<'_>) -> Option<Arc<dyn Strategy>> {
+    let speed = control.number("constant_speed_mm_per_s", 0.0..=10_000.0)?;
+    Some(Arc::new(ConstantStrategy { speed: MmPerS::new(speed).ok()? }))
+}
+
+impl Strategy for ConstantStrategy {
+    fn controller(&self, _: &CellFacts) -> Box<dyn WidthController> {
+        Box::new(ConstantControl { speed: self.speed })
+    }
+
+    fn check(&self, control: &Table<'_>, _: MmPerS, limits: Limits) {
+        if self.speed < limits.min_speed || self.speed > limits.max_speed {
+            let (low, high) = (limits.min_speed, limits.max_speed);
+            let found = self.speed.get().to_string();
+            let expected = format!("a speed within [limits], {low} to {high}");
+            control.report("constant_speed_mm_per_s", found, expected);
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ConstantControl {
+    speed: MmPerS,
+}
+
+impl WidthController for ConstantControl {
+    fn measured(&mut self, sample: &WidthSample, _: &mut WidthTrace) -> Option<Tracking> {
+        let goes_on = sample.tracked.is_some() || sample.may_begin;
+        goes_on.then(|| Tracking::on(sample.captured_at))
+    }
+
+    fn speed(&mut self, _: &SpeedRequest, _: &mut WidthTrace) -> Option<MmPerS> {
+        Some(self.speed)
+    }
+}

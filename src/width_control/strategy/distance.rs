@@ -1,0 +1,167 @@
+//! `law = "distance"`: the width is held by where along the path bead was laid, with PI
+//! control to fall back to.
+
+use std::sync::Arc;
+
+use super::pi::{PiControl, cautious_gains};
+use super::{CellFacts, Registration, Strategy};
+use crate::core::time::Stamp;
+use crate::core::units::{Mm, MmPerS};
+use crate::document::Table;
+use crate::width_control::controller::{
+    BeadReport, Outlook, SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
+};
+use crate::width_control::distance::{ByDistance, DistanceSettings, Distrust};
+
+/// Control by distance in a cell.
+pub const REGISTRATION: Registration =
+    Registration { name: "distance", needs_gains: false, read: |control| Some(read(control)?) };
+
+/// How far the flow drifts along a metre of path unless the file says so, as a
+/// fraction.
+const DRIFT_PER_ROOT_M: f64 = 0.0055;
+
+/// Control by distance, and what it knows of the bead beforehand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DistanceStrategy {
+    /// b in w = A·(v/v₀)^−b.
+    pub exponent: f64,
+    /// Whether it is learnt from the data.
+    pub learns_exponent: bool,
+    /// How far the flow drifts along a metre, as a fraction.
+    pub drift_per_root_m: f64,
+}
+
+fn read(control: &Table<'_>) -> Option<Arc<dyn Strategy>> {
+    let exponent = control.number("exponent", 0.02..=2.0);
+    let learns = control.choice("exponent_learns", &[("yes", true), ("no", false)]);
+    let drift = control.number_or("drift_per_root_m", 1e-5..=1.0, DRIFT_PER_ROOT_M);
+    Some(Arc::new(DistanceStrategy {
+        exponent: exponent?,
+        learns_exponent: learns?,
+        drift_per_root_m: drift?,
+    }))
+}
+
+impl Strategy for DistanceStrategy {
+    fn controller(&self, cell: &CellFacts) -> Box<dyn WidthController> {
+        let settings = DistanceSettings {
+            offset: cell.camera_offset,
+            offset_sigma: cell.camera_offset_sigma,
+            gauge: cell.gauge_length,
+            reference_speed: cell.start_speed,
+            exponent: self.exponent,
+            learns_exponent: self.learns_exponent,
+            drift_per_root_m: self.drift_per_root_m,
+        };
+        let gains = cell.gains.unwrap_or_else(|| cautious_gains(cell, self.exponent));
+        Box::new(DistanceControl {
+            by_distance: ByDistance::new(settings),
+            pi: PiControl::new(gains, cell.max_gap),
+            fallback: None,
+            start_length: cell.start_length,
+            camera_offset: cell.camera_offset,
+        })
+    }
+
+    fn sees_only_laid_bead(&self) -> bool {
+        true
+    }
+}
+
+/// Control by distance until its model is contradicted, then PI control for the rest of
+/// the bead.
+#[derive(Debug, Clone, PartialEq)]
+struct DistanceControl {
+    by_distance: ByDistance,
+    pi: PiControl,
+    fallback: Option<Distrust>,
+    start_length: Mm,
+    camera_offset: Mm,
+}
+
+impl DistanceControl {
+    /// A first reason to fall back stays for the bead.
+    fn look_for_fallback(&mut self, is_path_known: bool) {
+        let why = if is_path_known { self.by_distance.distrust() } else { Some(Distrust::NoPath) };
+        self.fallback = self.fallback.or(why);
+    }
+
+    fn learn(&mut self, sample: &WidthSample, trace: &mut WidthTrace) {
+        if let Some(path) = sample.nozzle_path
+            && sample.is_own_bead
+        {
+            let wanted = sample.width - sample.error;
+            let width = (sample.width, sample.sigma);
+            trace.distance = Some(self.by_distance.measured(path, width, wanted));
+            self.look_for_fallback(sample.is_path_known);
+        }
+    }
+
+    fn is_ready(&self) -> bool {
+        self.by_distance.is_ready() && self.fallback.is_none()
+    }
+}
+
+impl WidthController for DistanceControl {
+    fn begin_bead(&mut self) {
+        self.fallback = None;
+        self.pi.reset();
+        self.by_distance.begin_bead();
+    }
+
+    fn robot_reported(&mut self, report: &BeadReport) {
+        self.by_distance.reported(report.at, report.path, report.speed, report.flow_share);
+        self.look_for_fallback(report.is_path_known);
+    }
+
+    /// Learns from every width, whoever sets the speed. Where the first whole gauge of
+    /// bead has not been seen yet, that is waited for.
+    fn measured(&mut self, sample: &WidthSample, trace: &mut WidthTrace) -> Option<Tracking> {
+        self.learn(sample, trace);
+        let is_ready = self.is_ready();
+        match sample.tracked {
+            Some(seen_at) if self.pi.is_running() => self.pi.go_on(seen_at, sample, trace),
+            Some(seen_at) if is_ready => Some(Tracking::on(sample.captured_at.max(seen_at))),
+            Some(_) => Some(self.pi.start(sample, trace)),
+            None if sample.may_begin && is_ready => {
+                self.pi.reset();
+                Some(Tracking::on(sample.captured_at))
+            }
+            None if sample.may_begin && self.fallback.is_some() => {
+                Some(self.pi.start(sample, trace))
+            }
+            None => None,
+        }
+    }
+
+    /// Begins to track as soon as the first part of the bead is laid and the bead is
+    /// known, be it from the bead before: there is nothing to wait for.
+    fn before_setpoint(&mut self, outlook: &Outlook) -> Option<Stamp> {
+        if self.fallback.is_some() {
+            return None;
+        }
+        let primed = outlook.laid.is_some_and(|laid| laid >= self.start_length);
+        let seen_at = if outlook.is_priming && primed && self.by_distance.is_ready() {
+            self.pi.reset();
+            outlook.now
+        } else {
+            outlook.tracked.filter(|_| !self.pi.is_running())?
+        };
+        let Some((path, laid)) = outlook.path.zip(outlook.laid) else { return Some(seen_at) };
+        self.by_distance.steers(path);
+        // Where no bead can be seen yet, none is missing.
+        Some(if laid < self.camera_offset { outlook.now } else { seen_at })
+    }
+
+    fn speed(&mut self, request: &SpeedRequest, _: &mut WidthTrace) -> Option<MmPerS> {
+        match self.pi.demand() {
+            Some(demand) => Some(demand),
+            None => self.by_distance.speed(request.target?, request.from, request.lasts),
+        }
+    }
+
+    fn fallback(&self) -> Option<Distrust> {
+        self.fallback
+    }
+}

@@ -1,0 +1,121 @@
+//! `law = "pi"`: proportional-integral control on the widths as they are seen, as in
+//! Shojaei Barjuei et al. 2022.
+
+use std::sync::Arc;
+
+use super::{CellFacts, Registration, Strategy};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::MmPerS;
+use crate::width_control::controller::{
+    SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
+};
+use crate::width_control::pi::{Demand, Pi, PiGains, Saturation};
+
+/// PI control in a cell.
+pub const REGISTRATION: Registration =
+    Registration { name: "pi", needs_gains: true, read: |_| Some(Arc::new(PiStrategy)) };
+
+/// PI control with the gains of the cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PiStrategy;
+
+impl Strategy for PiStrategy {
+    fn controller(&self, cell: &CellFacts) -> Box<dyn WidthController> {
+        let gains = cell.gains.unwrap_or_else(|| cautious_gains(cell, 1.0));
+        Box::new(PiControl::new(gains, cell.max_gap))
+    }
+}
+
+/// Gains where a cell gives none: an integral that the dead time from nozzle to camera
+/// allows for a bead with w = A·(v/v₀)^−`exponent` (internal model control with twice the
+/// dead time as the lag).
+pub fn cautious_gains(cell: &CellFacts, exponent: f64) -> PiGains {
+    let speed = cell.start_speed.max(MmPerS::constant(1.0));
+    let slope = exponent * cell.target.get() / speed.get();
+    let dead_s = cell.camera_offset / (speed * Span::from_secs(1.0));
+    let dead_s = dead_s + cell.setpoint_period.secs();
+    PiGains { kp_per_s: 0.0, ki_per_s2: 1.0 / (3.0 * dead_s * slope.max(1e-6)) }
+}
+
+/// PI control that starts without a bump, and starts anew after a gap.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PiControl {
+    gains: PiGains,
+    max_gap: Span,
+    /// The integral and the last demand, once it has begun.
+    running: Option<(Pi, MmPerS)>,
+}
+
+impl PiControl {
+    /// Control that has not begun.
+    pub fn new(gains: PiGains, max_gap: Span) -> Self {
+        Self { gains, max_gap, running: None }
+    }
+
+    /// Forgets the integral.
+    pub fn reset(&mut self) {
+        self.running = None;
+    }
+
+    /// Whether it has begun.
+    pub fn is_running(&self) -> bool {
+        self.running.is_some()
+    }
+
+    /// Begins at a width, from the speed that is driven.
+    pub fn start(&mut self, sample: &WidthSample, trace: &mut WidthTrace) -> Tracking {
+        let mut pi = Pi::start_bumpless(self.gains, sample.driven, sample.error);
+        let demand = pi.step(sample.error, Span::ZERO, Saturation::None);
+        trace.note(&demand);
+        self.running = Some((pi, demand.speed));
+        Tracking { seen_at: sample.captured_at, is_new: true }
+    }
+
+    /// Goes on with a width, after those until `seen_at`; none where it is no newer.
+    pub fn go_on(
+        &mut self,
+        seen_at: Stamp,
+        sample: &WidthSample,
+        trace: &mut WidthTrace,
+    ) -> Option<Tracking> {
+        let dt = sample.captured_at - seen_at;
+        if dt <= Span::ZERO {
+            return None;
+        }
+        match &mut self.running {
+            Some((pi, demand)) if dt <= self.max_gap => {
+                let wanted = pi.step(sample.error, dt, sample.saturation);
+                trace.note(&wanted);
+                *demand = wanted.speed;
+                Some(Tracking::on(sample.captured_at))
+            }
+            _ => Some(self.start(sample, trace)),
+        }
+    }
+
+    /// The last demand.
+    pub fn demand(&self) -> Option<MmPerS> {
+        self.running.map(|(_, demand)| demand)
+    }
+}
+
+impl WidthController for PiControl {
+    fn measured(&mut self, sample: &WidthSample, trace: &mut WidthTrace) -> Option<Tracking> {
+        match sample.tracked {
+            Some(seen_at) => self.go_on(seen_at, sample, trace),
+            None => sample.may_begin.then(|| self.start(sample, trace)),
+        }
+    }
+
+    fn speed(&mut self, _: &SpeedRequest, _: &mut WidthTrace) -> Option<MmPerS> {
+        self.demand()
+    }
+}
+
+impl WidthTrace {
+    fn note(&mut self, demand: &Demand) {
+        self.proportional = Some(demand.proportional);
+        self.integral = Some(demand.integral);
+        self.demand = Some(demand.speed);
+    }
+}
