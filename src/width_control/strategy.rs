@@ -1,83 +1,16 @@
-//! The width controllers that a cell may choose, and how it names them.
+//! The width controllers that a cell may choose.
 //!
 //! To add one: a file in this folder with its settings and its controller, and a line in
 //! [`STRATEGIES`].
 
 pub mod constant;
 pub mod distance;
+mod kind;
 pub mod pi;
 pub mod steps;
 
-use std::any::Any;
-use std::fmt::Debug;
-use std::sync::Arc;
-
-use super::controller::WidthController;
-use super::limiter::Limits;
-use super::pi::PiGains;
-use crate::core::time::Span;
-use crate::core::units::{Mm, MmPerS};
-use crate::document::Table;
-
-/// A width controller as a cell chooses it.
-#[derive(Debug)]
-pub struct Registration {
-    /// Its name in `law` of `[control]`.
-    pub name: &'static str,
-    /// Whether it needs the gains of PI control.
-    pub needs_gains: bool,
-    /// Reads its own keys of `[control]`; none where they are wrong.
-    pub read: fn(&Table<'_>) -> Option<Arc<dyn Strategy>>,
-}
+pub use kind::{CellFacts, Registration, Strategy};
 
 /// Every width controller that a cell may choose.
 pub const STRATEGIES: [&Registration; 4] =
     [&pi::REGISTRATION, &distance::REGISTRATION, &steps::REGISTRATION, &constant::REGISTRATION];
-
-/// A width controller with its settings.
-pub trait Strategy: Any + Debug + Send + Sync {
-    /// The controller for a cell.
-    fn controller(&self, cell: &CellFacts) -> Box<dyn WidthController>;
-
-    /// Refuses settings that leave what the robot may do. `control` is the table that
-    /// they were read from.
-    fn check(&self, _control: &Table<'_>, _start: MmPerS, _limits: Limits) {}
-
-    /// Whether the bead within the whole gauge must have been laid before it is seen.
-    fn sees_only_laid_bead(&self) -> bool {
-        false
-    }
-}
-
-impl dyn Strategy {
-    /// The settings, where the strategy is of a kind.
-    pub fn as_kind<T: Strategy>(&self) -> Option<&T> {
-        let any: &dyn Any = self;
-        any.downcast_ref()
-    }
-}
-
-/// What a width controller is made for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CellFacts {
-    /// Width that is wanted most of the time.
-    pub target: Mm,
-    /// Narrowest and widest width that is accepted.
-    pub width_range: (Mm, Mm),
-    /// Gains of PI control, where the cell gives them.
-    pub gains: Option<PiGains>,
-    /// Longest time between two widths over which is integrated.
-    pub max_gap: Span,
-    /// Speed of the first part of a bead.
-    pub start_speed: MmPerS,
-    /// Its length.
-    pub start_length: Mm,
-    /// Path length from the nozzle back to the middle of the gauge.
-    pub camera_offset: Mm,
-    /// Its standard deviation.
-    pub camera_offset_sigma: Mm,
-    /// Length of bead within the gauge.
-    pub gauge_length: Mm,
-    /// Time between two setpoints.
-    pub setpoint_period: Span,
-}

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::{CellFacts, Registration, Strategy};
+use super::kind::{CellFacts, Registration, Strategy};
 use crate::core::units::MmPerS;
 use crate::document::Table;
 use crate::width_control::controller::{

@@ -3,8 +3,8 @@
 
 use std::sync::Arc;
 
+use super::kind::{CellFacts, Registration, Strategy};
 use super::pi::{PiControl, cautious_gains};
-use super::{CellFacts, Registration, Strategy};
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS};
 use crate::document::Table;
