@@ -1,6 +1,8 @@
 use std::io::Cursor;
+use std::time::Duration;
 
 use super::*;
+use crate::cell::file::KeepFrames;
 use crate::control::step::{State, Trace};
 use crate::core::frame::{Channel, Pixels};
 use crate::core::robot::{RobotLimits, RobotMode, RobotState};
