@@ -132,7 +132,9 @@ pub fn setup(
         }
         Strategy::Pressure(settings) => Law::Pressure(Box::new(PressureLoop::new(**settings))),
         Strategy::Screw(settings) => Law::Screw(ScrewFill::new(settings)?),
-        Strategy::Adaptive(parts) => Law::Adaptive(AdaptiveNozzle::new(parts.0, parts.1)),
+        Strategy::Adaptive(settings) => {
+            Law::Adaptive(AdaptiveNozzle::new(settings.controller, settings.nozzle))
+        }
     };
     let named = |name| files.iter().find(|file| file.name == name);
     let plan = named(PLAN_ATTACHMENT).map(|file| job::plan(run, part, file)).transpose()?;

@@ -184,7 +184,7 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let target =
         control_table.as_ref().and_then(|t| control::read_course(t, layers.as_ref(), width));
     if let (Some(table), Some(target), Some(gauge)) = (&control_table, &target, &gauge) {
-        control::check_target(table, layers.as_ref(), target, gauge.width_range);
+        control::check_target(table, layers.as_ref(), target, gauge);
     }
     let control = control_table.as_ref().and_then(|t| control::read_control(t, target.clone()));
     let camera_table = root.run_table("camera");
