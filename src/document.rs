@@ -2,17 +2,17 @@
 //! every violation on the way, with its line, instead of ending at the first.
 
 pub mod csv;
+mod file_text;
 mod keys;
 mod problem;
 mod scalar;
-mod source;
 mod table;
 mod value;
 
 use toml::Spanned;
 use toml::de::DeTable;
 
-use self::source::Source;
+use self::file_text::FileText;
 
 pub use self::problem::{Problem, Problems};
 pub use self::table::Table;
@@ -22,7 +22,7 @@ const SLIPS: usize = 3;
 
 /// A parsed file and what was found wrong with it so far.
 pub struct Document<'a> {
-    source: Source<'a>,
+    text: FileText<'a>,
     root: Spanned<DeTable<'a>>,
 }
 
@@ -31,26 +31,26 @@ impl<'a> Document<'a> {
     /// `for_run` makes the tables that only a run needs mandatory.
     pub fn parse(file: &'a str, text: &'a str, for_run: bool) -> Self {
         let (root, errors) = DeTable::parse_recoverable(text);
-        let source = Source::new(file, text, for_run);
+        let text = FileText::new(file, text, for_run);
         let more = errors.len().saturating_sub(SLIPS);
         for error in errors.into_iter().take(SLIPS) {
-            let line = error.span().map(|span| source.line_of(span.start));
-            source.report(line, "", format!("not TOML: {}", error.message()), "");
+            let line = error.span().map(|span| text.line_of(span.start));
+            text.report(line, "", format!("not TOML: {}", error.message()), "");
         }
         if more > 0 {
-            source.report(None, "", format!("not TOML: and {more} more, likely of the same"), "");
+            text.report(None, "", format!("not TOML: and {more} more, likely of the same"), "");
         }
-        Self { source, root }
+        Self { text, root }
     }
 
     /// The file's outermost table.
     pub fn root(&self) -> Table<'_> {
-        Table::root(&self.source, self.root.get_ref())
+        Table::root(&self.text, self.root.get_ref())
     }
 
     /// The value that was read if nothing was wrong, else everything that was.
     pub fn finish<T>(self, value: Option<T>) -> Result<T, Problems> {
-        self.source.finish(value)
+        self.text.finish(value)
     }
 }
 

@@ -6,14 +6,14 @@ use super::problem::{Problem, Problems};
 
 /// A file's name and text, which give a violation its line, and the list that
 /// every table of the file adds to.
-pub(super) struct Source<'a> {
+pub(super) struct FileText<'a> {
     file: &'a str,
     text: &'a str,
     for_run: bool,
     problems: RefCell<Vec<Problem>>,
 }
 
-impl<'a> Source<'a> {
+impl<'a> FileText<'a> {
     /// A text in which nothing is wrong yet.
     pub(super) fn new(file: &'a str, text: &'a str, for_run: bool) -> Self {
         Self { file, text, for_run, problems: RefCell::default() }
