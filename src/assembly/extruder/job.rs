@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use crate::assembly::AssemblyError;
+use crate::assembly::error::AssemblyError;
 use crate::cell::file::{ExtruderPart, RunPart};
 use crate::extruder::trajectory::PlannedJob;
 use crate::io::record::ExtruderFile;
