@@ -13,6 +13,6 @@ pub use device_line::{DeviceLine, LineBody};
 pub use fields::{Decimals, Fields, LineError, one_word, printing};
 pub use limits::{MAX_BAD_LINES, MAX_LINE, MAX_VALID_MS, MIN_VALID_MS, VERSION};
 pub use pc_hello::{BYE_LINE, hello_line, read_hello};
-pub use refusal::{ErrCode, Refusal};
+pub use refusal::{ErrCode, LineRefusal};
 pub use sequence::{DeviceClock, Sequence, Validity};
 pub use split::{BadLines, LineFault, LineSplitter};

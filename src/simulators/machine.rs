@@ -2,7 +2,7 @@
 
 use crate::core::time::Stamp;
 use crate::link::LineError;
-use crate::link::frame::{DeviceLine, LineBody, Refusal};
+use crate::link::frame::{DeviceLine, LineBody, LineRefusal};
 
 /// Is told what happens, in words for the person who watches.
 pub type Notice = Box<dyn FnMut(Stamp, &str) + Send>;
@@ -58,7 +58,7 @@ pub struct RefusedLine {
     /// Its number; 0 where it had none that could be read.
     pub seq: u64,
     /// Why.
-    pub why: Refusal,
+    pub why: LineRefusal,
 }
 
 impl<H: LineBody, S: LineBody> From<DeviceLine<H, S>> for Answer {
@@ -66,7 +66,7 @@ impl<H: LineBody, S: LineBody> From<DeviceLine<H, S>> for Answer {
         let line = answer.format();
         let refused = match answer {
             DeviceLine::Err { seq, code, text } => {
-                Some(RefusedLine { seq, why: Refusal { code, text } })
+                Some(RefusedLine { seq, why: LineRefusal { code, text } })
             }
             DeviceLine::Hello(_) | DeviceLine::State(_) => None,
         };

@@ -6,7 +6,7 @@ use super::drive_line::DriveLine;
 use super::extruder_line::{ExtruderHello, ExtruderLine, ExtruderStatus};
 use crate::core::time::Stamp;
 use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
-use crate::link::frame::{DeviceClock, ErrCode, Refusal, Sequence, Validity};
+use crate::link::frame::{DeviceClock, ErrCode, LineRefusal, Sequence, Validity};
 
 /// What stands without a command.
 const REST: ExtruderCommand = ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 };
@@ -122,19 +122,19 @@ impl Gate {
         seq: u64,
         command: ExtruderCommand,
         validity: Validity,
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), LineRefusal> {
         self.sequence.check(seq)?;
         if let Some(code) = self.faults.refuse {
-            return Err(Refusal::on_purpose(code));
+            return Err(LineRefusal::on_purpose(code));
         }
         if self.failed && command.pump_on {
-            return Err(Refusal::new(ErrCode::Mode, "the pump has failed"));
+            return Err(LineRefusal::new(ErrCode::Mode, "the pump has failed"));
         }
         let ExtruderHello { drive, min, max, .. } = &self.hello;
         if command.pump_on && !(*min..=*max).contains(&command.value) {
             let (value, unit) = (command.value, drive.unit());
             let text = format!("{value} {unit} is not within {min} to {max}");
-            return Err(Refusal::new(ErrCode::Range, text));
+            return Err(LineRefusal::new(ErrCode::Range, text));
         }
         let until = self.clock.void_at(now, validity)?;
         self.command = Some((command, until));

@@ -3,7 +3,7 @@
 
 use super::fields::{Fields, LineError, printing};
 use super::limits::{MAX_LINE, VERSION};
-use super::refusal::{ErrCode, Refusal};
+use super::refusal::{ErrCode, LineRefusal};
 
 const KEYWORDS: [&str; 3] = ["HELLO", "STATE", "ERR"];
 
@@ -64,25 +64,25 @@ impl<H: LineBody, S: LineBody> DeviceLine<H, S> {
     }
 
     /// The answer to the line with this number, which is refused.
-    pub fn refused(seq: u64, refusal: Refusal) -> Self {
-        let Refusal { code, text } = refusal;
+    pub fn refused(seq: u64, refusal: LineRefusal) -> Self {
+        let LineRefusal { code, text } = refusal;
         Self::Err { seq, code, text }
     }
 
     /// The answer to bytes that make no line.
     pub fn bad_line(why: &str) -> Self {
-        Self::refused(0, Refusal::new(ErrCode::Form, why))
+        Self::refused(0, LineRefusal::new(ErrCode::Form, why))
     }
 }
 
 /// Reads the fields of an `ERR` line.
-fn parse_err(mut fields: Fields<'_>) -> Result<(u64, Refusal), LineError> {
+fn parse_err(mut fields: Fields<'_>) -> Result<(u64, LineRefusal), LineError> {
     let seq = fields.whole("seq")?;
     let word = fields.word("code")?;
     let code = ErrCode::ALL.into_iter().find(|code| code.word() == word);
     let expected = "STALE, RANGE, SEQUENCE, MODE or FORM";
     let code = code.ok_or_else(|| fields.wrong("code", expected, word))?;
-    Ok((seq, Refusal { code, text: fields.text() }))
+    Ok((seq, LineRefusal { code, text: fields.text() }))
 }
 
 /// An `ERR` line with its LF; its text is cut where it is too long.

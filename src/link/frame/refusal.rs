@@ -41,14 +41,14 @@ impl fmt::Display for ErrCode {
 
 /// A line is refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refusal {
+pub struct LineRefusal {
     /// Why.
     pub code: ErrCode,
     /// Why, for the operator.
     pub text: String,
 }
 
-impl Refusal {
+impl LineRefusal {
     /// With its code and its text.
     pub fn new(code: ErrCode, text: impl Into<String>) -> Self {
         Self { code, text: text.into() }

@@ -3,7 +3,7 @@
 //! lost, and that the line is not void.
 
 use super::limits::{MAX_VALID_MS, MIN_VALID_MS};
-use super::refusal::{ErrCode, Refusal};
+use super::refusal::{ErrCode, LineRefusal};
 use crate::core::time::Stamp;
 
 const NS_PER_MS: u64 = 1_000_000;
@@ -49,16 +49,16 @@ impl Sequence {
 
     /// Takes a line's number. After a gap the count goes on from what came, so
     /// that one lost line costs one refusal and not the connection.
-    pub fn check(&mut self, seq: u64) -> Result<(), Refusal> {
+    pub fn check(&mut self, seq: u64) -> Result<(), LineRefusal> {
         if !self.greeted {
-            return Err(Refusal::new(ErrCode::Form, "HELLO must come first"));
+            return Err(LineRefusal::new(ErrCode::Form, "HELLO must come first"));
         }
         let expected = self.expected;
         self.expected = expected.max(seq.saturating_add(1));
         if seq == expected {
             return Ok(());
         }
-        Err(Refusal::new(ErrCode::Sequence, format!("expected {expected}")))
+        Err(LineRefusal::new(ErrCode::Sequence, format!("expected {expected}")))
     }
 }
 
@@ -87,22 +87,25 @@ impl DeviceClock {
     }
 
     /// When a line is void that arrives now, if it is not already.
-    pub fn void_at(self, now: Stamp, validity: Validity) -> Result<Stamp, Refusal> {
+    pub fn void_at(self, now: Stamp, validity: Validity) -> Result<Stamp, LineRefusal> {
         let Self { of, start_ms } = self;
         let Validity { valid_ms, ref_t_ms } = validity;
         let t_ms = self.ms(now);
         if !(MIN_VALID_MS..=MAX_VALID_MS).contains(&valid_ms) {
             let text =
                 format!("valid_ms {valid_ms} is not within {MIN_VALID_MS} to {MAX_VALID_MS}");
-            return Err(Refusal::new(ErrCode::Range, text));
+            return Err(LineRefusal::new(ErrCode::Range, text));
         }
         if ref_t_ms > t_ms {
             let text = format!("ref_t_ms {ref_t_ms} lies ahead of the {of}'s {t_ms}");
-            return Err(Refusal::new(ErrCode::Range, text));
+            return Err(LineRefusal::new(ErrCode::Range, text));
         }
         let void_ms = ref_t_ms.saturating_add(valid_ms);
         if void_ms <= t_ms {
-            return Err(Refusal::new(ErrCode::Stale, format!("void since {} ms", t_ms - void_ms)));
+            return Err(LineRefusal::new(
+                ErrCode::Stale,
+                format!("void since {} ms", t_ms - void_ms),
+            ));
         }
         let since_start_ms = void_ms.saturating_sub(start_ms);
         Ok(Stamp::from_ns(since_start_ms.saturating_mul(NS_PER_MS)))

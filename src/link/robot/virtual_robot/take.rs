@@ -3,7 +3,7 @@
 use super::{Doing, RobotCell};
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
-use crate::link::frame::{ErrCode, Refusal, Validity};
+use crate::link::frame::{ErrCode, LineRefusal, Validity};
 use crate::link::robot::params::RobotParams;
 use crate::link::robot::pc_line::PcLine;
 use crate::link::robot::robot_line::{RobotLine, mode_word};
@@ -29,7 +29,7 @@ impl RobotCell {
 
     /// A stop is obeyed even where the count is broken; the PC hears of that
     /// all the same.
-    fn take_stop(&mut self, seq: u64) -> Result<(), Refusal> {
+    fn take_stop(&mut self, seq: u64) -> Result<(), LineRefusal> {
         let counted = self.sequence.check(seq);
         if counted.is_ok() {
             self.sequence.apply(seq);
@@ -41,19 +41,24 @@ impl RobotCell {
         counted
     }
 
-    fn take_speed(&mut self, seq: u64, speed: MmPerS, validity: Validity) -> Result<(), Refusal> {
+    fn take_speed(
+        &mut self,
+        seq: u64,
+        speed: MmPerS,
+        validity: Validity,
+    ) -> Result<(), LineRefusal> {
         self.sequence.check(seq)?;
         if let Some(code) = self.faults.refuse {
-            return Err(Refusal::on_purpose(code));
+            return Err(LineRefusal::on_purpose(code));
         }
         if !matches!(self.doing, Doing::Print { .. } | Doing::Hold { .. }) {
             let mode = mode_word(self.mode());
-            return Err(Refusal::new(ErrCode::Mode, format!("no setpoint is taken in {mode}")));
+            return Err(LineRefusal::new(ErrCode::Mode, format!("no setpoint is taken in {mode}")));
         }
         let RobotParams { min, max, .. } = self.params;
         if speed < min || speed > max {
             let text = format!("{speed} is not within {min} to {max}");
-            return Err(Refusal::new(ErrCode::Range, text));
+            return Err(LineRefusal::new(ErrCode::Range, text));
         }
         let until = self.clock().void_at(self.at, validity)?;
         self.doing = Doing::Print { target: speed, until };
