@@ -8,7 +8,7 @@ mod starts;
 use std::fs;
 
 pub use behaviour::{Behaviour, behaviour};
-use behaviour::{WITHOUT_FILE, wrong};
+use behaviour::{WITHOUT_FILE, wrong, wrong_file};
 
 use super::error::AssemblyError;
 use crate::cell::extruder::{Extruder, FeedforwardKeys, ModelSource, Strategy};
@@ -190,7 +190,7 @@ fn forecast(
 /// A profile of commands; one of another quantity, or beyond the limits, is
 /// refused before anything moves.
 fn played(file: &ExtruderFile, part: &ExtruderPart) -> Result<Played, AssemblyError> {
-    let wrong = |what: String| AssemblyError::unfit(format!("{}: {what}", file.source));
+    let wrong = |what: String| wrong_file(file, &what);
     let (profile, quantity) =
         profile::file::parse(&file.text).map_err(|error| wrong(error.to_string()))?;
     let unit = part.extruder.drive.unit();

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 pub use adaptive::AdaptiveSettings;
 pub use context::Rates;
 pub use link::ExtruderLink;
-pub use part::{Beside, ExtruderPart};
+pub use part::{BeadStart, Beside, ExtruderPart};
 pub use plant::{
     ExtruderPlant, GainWave, InputLoad, LinearPlant, MeltPlant, PlantKind, PressurePlant,
     ScrewPlant,

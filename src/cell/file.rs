@@ -10,7 +10,7 @@ mod robot;
 use std::path::Path;
 
 use super::control;
-use super::extruder::Beside;
+use super::extruder::{BeadStart, Beside};
 use crate::calibration::{Calibration, SurfaceMap};
 use crate::core::frame::Channel;
 use crate::core::units::Mm;
@@ -200,7 +200,7 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     }
     let simulation = table::read(root);
     let speed = robot.as_ref().map(|robot| robot.start_speed);
-    let bead = width.zip(speed);
+    let bead = width.zip(speed).map(|(width, speed)| BeadStart { width, speed });
     let beside = Beside {
         bead,
         robot_address: robot.as_ref().map(|robot| robot.address.as_str()),

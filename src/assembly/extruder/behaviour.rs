@@ -46,6 +46,11 @@ pub(super) fn wrong(cell: &str, what: &str) -> AssemblyError {
     AssemblyError::unfit(format!("{cell}: [extruder]: {what}"))
 }
 
+/// An error about a file of the extruder.
+pub(super) fn wrong_file(file: &ExtruderFile, what: &str) -> AssemblyError {
+    AssemblyError::unfit(format!("{}: {what}", file.source))
+}
+
 /// A screw that carries the same volume with every turn, as a model from rpm to
 /// mm³/s.
 fn carried(screw: DragFlow) -> Result<Behaviour, AssemblyError> {

@@ -11,7 +11,7 @@ use crate::io::image_file;
 use crate::io::recording::{Entry, Recording};
 
 mod disk;
-mod trouble;
+mod disk_faults;
 
 use disk::Disk;
 
