@@ -3,9 +3,13 @@
 mod error;
 pub mod extruder;
 mod range;
+mod side;
 
 pub use error::AssemblyError;
 pub use range::{beyond, steady};
+pub use side::{ExtruderSide, SimulatedSide};
+
+use extruder::ExtruderFiles;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,39 +18,9 @@ use crate::calibration::{Calibration, SurfaceMap};
 use crate::cell::Cell;
 use crate::cell::file::{CalibrationSource, ExtruderPart, Purpose};
 use crate::core::units::Mm;
-use crate::extruder::ExtruderSetup;
 use crate::io::calibration_file;
-use crate::io::record::ExtruderFile;
 use crate::sim::cell::Rig;
 use crate::sim::extruder::SimExtruder;
-
-/// The extruder side of a cell that is commanded.
-#[derive(Debug, Clone)]
-pub struct ExtruderSide {
-    /// What the controller knows.
-    pub setup: ExtruderSetup,
-    /// The files that it is made from.
-    pub files: Vec<ExtruderFile>,
-    /// What in them, or about them, an operator should know; nothing that keeps the
-    /// cell from running.
-    pub warnings: Vec<String>,
-}
-
-/// The extruder side of a simulated cell.
-#[derive(Debug)]
-pub struct SimulatedSide {
-    /// What the simulation needs.
-    pub rig: Rig,
-    /// As those of [`ExtruderSide`].
-    pub warnings: Vec<String>,
-}
-
-impl ExtruderSide {
-    /// The file that its strategy is made from, where there is one.
-    pub fn file(&self) -> Option<&ExtruderFile> {
-        extruder::of_strategy(&self.files)
-    }
-}
 
 /// A cell, its calibration, and their texts for the recording.
 #[derive(Debug, Clone)]
@@ -118,7 +92,7 @@ impl LoadedCell {
         let Some(run) = &self.cell.run else { return Ok(None) };
         let Some(part) = &run.extruder else { return Ok(None) };
         let cell = self.path.display().to_string();
-        let (files, warnings) = extruder::files(part, &cell)?;
+        let ExtruderFiles { files, warnings } = extruder::files(part, &cell)?;
         let setup = extruder::setup(run, part, &cell, &files)?;
         Ok(Some(ExtruderSide { setup, files, warnings }))
     }

@@ -2,14 +2,17 @@
 //! every violation on the way, with its line, instead of ending at the first.
 
 pub mod csv;
+mod file_text;
+mod keys;
 mod problem;
+mod scalar;
 mod table;
 mod value;
 
-use std::cell::RefCell;
-
 use toml::Spanned;
 use toml::de::DeTable;
+
+use self::file_text::FileText;
 
 pub use self::problem::{Problem, Problems};
 pub use self::table::Table;
@@ -19,11 +22,8 @@ const SLIPS: usize = 3;
 
 /// A parsed file and what was found wrong with it so far.
 pub struct Document<'a> {
-    file: &'a str,
-    text: &'a str,
+    text: FileText<'a>,
     root: Spanned<DeTable<'a>>,
-    problems: RefCell<Vec<Problem>>,
-    for_run: bool,
 }
 
 impl<'a> Document<'a> {
@@ -31,55 +31,26 @@ impl<'a> Document<'a> {
     /// `for_run` makes the tables that only a run needs mandatory.
     pub fn parse(file: &'a str, text: &'a str, for_run: bool) -> Self {
         let (root, errors) = DeTable::parse_recoverable(text);
-        let document = Self { file, text, root, problems: RefCell::default(), for_run };
+        let text = FileText::new(file, text, for_run);
         let more = errors.len().saturating_sub(SLIPS);
         for error in errors.into_iter().take(SLIPS) {
-            let line = error.span().map(|span| document.line_of(span.start));
-            document.report(line, "", format!("not TOML: {}", error.message()), "");
+            let line = error.span().map(|span| text.line_of(span.start));
+            text.report(line, "", format!("not TOML: {}", error.message()), "");
         }
         if more > 0 {
-            document.report(None, "", format!("not TOML: and {more} more, likely of the same"), "");
+            text.report(None, "", format!("not TOML: and {more} more, likely of the same"), "");
         }
-        document
+        Self { text, root }
     }
 
     /// The file's outermost table.
     pub fn root(&self) -> Table<'_> {
-        Table::root(self, self.root.get_ref())
+        Table::root(&self.text, self.root.get_ref())
     }
 
     /// The value that was read if nothing was wrong, else everything that was.
     pub fn finish<T>(self, value: Option<T>) -> Result<T, Problems> {
-        let mut list = self.problems.into_inner();
-        // What follows from a slip of syntax is no news.
-        if list.iter().any(|problem| problem.expected.is_empty()) {
-            list.retain(|problem| problem.expected.is_empty());
-        }
-        list.sort_by_key(|problem| problem.line.unwrap_or(usize::MAX));
-        match value {
-            Some(value) if list.is_empty() => Ok(value),
-            _ => Err(Problems { file: self.file.to_string(), list }),
-        }
-    }
-
-    fn line_of(&self, offset: usize) -> usize {
-        let end = offset.min(self.text.len());
-        self.text.as_bytes().iter().take(end).filter(|&&byte| byte == b'\n').count() + 1
-    }
-
-    fn report(
-        &self,
-        line: Option<usize>,
-        key: &str,
-        found: impl Into<String>,
-        expected: impl Into<String>,
-    ) {
-        self.problems.borrow_mut().push(Problem {
-            line,
-            key: key.to_string(),
-            found: found.into(),
-            expected: expected.into(),
-        });
+        self.text.finish(value)
     }
 }
 

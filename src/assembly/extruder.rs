@@ -1,35 +1,31 @@
 //! The strategy of an extruder from its cell and the file that the cell names:
 //! from the disk for a run, from the recording for a replay.
 
+mod behaviour;
 mod job;
 mod starts;
 
 use std::fs;
 
-use crate::assembly::AssemblyError;
+pub use behaviour::{Behaviour, behaviour};
+use behaviour::{WITHOUT_FILE, wrong, wrong_file};
+
+use super::error::AssemblyError;
 use crate::cell::extruder::{Extruder, FeedforwardKeys, ModelSource, Strategy};
 use crate::cell::file::{ExtruderPart, RunPart};
-use crate::core::quantity::Unit;
 use crate::core::time::Span;
-use crate::core::units::Rpm;
 use crate::extruder::feedforward::{
     ExtruderModel, FeedforwardError, FlowForecast, InverseSettings, ScrewSpeed, Tracker,
 };
-use crate::extruder::law::{
-    AdaptiveNozzle, Constant, Foreseen, OperatingPoint, Played, PressureLoop, ScrewFill,
-};
-use crate::extruder::rheology::DragFlow;
+use crate::extruder::law::{AdaptiveNozzle, Constant, Foreseen, Played, PressureLoop, ScrewFill};
 use crate::extruder::{ExtruderSetup, Law};
-use crate::identify::{file as model, profile};
+use crate::identify::profile;
 use crate::io::model_file;
 use crate::io::record::ExtruderFile;
 use crate::io::record::format::{
     MODEL_ATTACHMENT, PLAN_ATTACHMENT, PROFILE_ATTACHMENT, STARTS_ATTACHMENT,
 };
-use crate::io::recorded::COMMAND;
 use crate::numeric::lti::TransferFunction;
-
-const WITHOUT_FILE: &str = "found a strategy without its file";
 
 /// What the files that an extruder side is made from are called in a recording.
 pub fn attachments(extruder: &Extruder) -> Vec<&'static str> {
@@ -53,12 +49,18 @@ pub fn of_strategy(files: &[ExtruderFile]) -> Option<&ExtruderFile> {
     files.iter().find(|file| [MODEL_ATTACHMENT, PROFILE_ATTACHMENT].contains(&file.name))
 }
 
+/// The files that a cell names for its extruder.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExtruderFiles {
+    /// Those that it is made from.
+    pub files: Vec<ExtruderFile>,
+    /// What is odd about them.
+    pub warnings: Vec<String>,
+}
+
 /// Reads the files that the cell names for its extruder. `cell` is what messages call
-/// the cell. Also gives warnings about them.
-pub fn files(
-    part: &ExtruderPart,
-    cell: &str,
-) -> Result<(Vec<ExtruderFile>, Vec<String>), AssemblyError> {
+/// the cell.
+pub fn files(part: &ExtruderPart, cell: &str) -> Result<ExtruderFiles, AssemblyError> {
     let mut warnings = Vec::new();
     let file = strategy_file(part, cell, &mut warnings)?;
     let mut files: Vec<ExtruderFile> = file.into_iter().collect();
@@ -73,7 +75,7 @@ pub fn files(
         })?;
         files.push(ExtruderFile { name, source, text });
     }
-    Ok((files, warnings))
+    Ok(ExtruderFiles { files, warnings })
 }
 
 /// Reads the file that the cell names for its extruder; of a library the model
@@ -132,7 +134,9 @@ pub fn setup(
         }
         Strategy::Pressure(settings) => Law::Pressure(Box::new(PressureLoop::new(**settings))),
         Strategy::Screw(settings) => Law::Screw(ScrewFill::new(settings)?),
-        Strategy::Adaptive(parts) => Law::Adaptive(AdaptiveNozzle::new(parts.0, parts.1)),
+        Strategy::Adaptive(settings) => {
+            Law::Adaptive(AdaptiveNozzle::new(settings.controller, settings.nozzle))
+        }
     };
     let named = |name| files.iter().find(|file| file.name == name);
     let plan = named(PLAN_ATTACHMENT).map(|file| job::plan(run, part, file)).transpose()?;
@@ -144,73 +148,15 @@ pub fn setup(
     Ok(ExtruderSetup { timing, plan, ..part.extruder.setup(law) })
 }
 
-/// How the extruder of a cell behaves about its operating point, from the command to
-/// mm³/s.
-pub fn behaviour(
-    keys: &FeedforwardKeys,
-    part: &ExtruderPart,
-    cell: &str,
-    file: Option<&ExtruderFile>,
-) -> Result<(TransferFunction, OperatingPoint), AssemblyError> {
-    match (&keys.model, file) {
-        (ModelSource::Screw(screw), _) => carried(*screw),
-        (_, Some(file)) => identified(keys, part, cell, file),
-        (_, None) => Err(wrong(cell, WITHOUT_FILE)),
-    }
-}
-
-fn wrong(cell: &str, what: &str) -> AssemblyError {
-    AssemblyError::unfit(format!("{cell}: [extruder]: {what}"))
-}
-
-/// A screw that carries the same volume with every turn, as a model from rpm to
-/// mm³/s.
-fn carried(screw: DragFlow) -> Result<(TransferFunction, OperatingPoint), AssemblyError> {
-    let one = screw.flow(Rpm::constant(1.0))?;
-    Ok((TransferFunction::gain(one.get())?, OperatingPoint::default()))
-}
-
-/// The model of a file, from the cell's command to mm³/s.
-fn identified(
-    keys: &FeedforwardKeys,
-    part: &ExtruderPart,
-    cell: &str,
-    file: &ExtruderFile,
-) -> Result<(TransferFunction, OperatingPoint), AssemblyError> {
-    let model = model::parse(&file.source, &file.text)?;
-    let (unit, flow) = (part.extruder.drive.unit(), Unit::Mm3PerS);
-    if model.input.unit != unit || model.output.unit != flow {
-        let what = format!(
-            "found a model from {} to {}, expected one from {unit} to {flow}",
-            model.input, model.output
-        );
-        return Err(wrong(cell, &what));
-    }
-    let gain = model.transfer.dc_gain();
-    if gain < 0.0 {
-        let what = format!(
-            "found a model with a gain of {gain:.4}, less flow from more {unit}; expected one \
-             above 0: look at the sign of a column"
-        );
-        return Err(wrong(cell, &what));
-    }
-    if keys.foretold_from == ScrewSpeed::Measured && model.input.name == COMMAND {
-        let what = "found a model whose input was the command, expected one of the screw as it \
-                    was measured (identify --input screw_rpm) for foretold_from = \"encoder\"";
-        return Err(wrong(cell, what));
-    }
-    let (command, flow_mm3_per_s) = model.operating_point;
-    Ok((model.transfer, OperatingPoint { command, flow_mm3_per_s }))
-}
-
 /// The inverse of how the extruder behaves about its operating point.
 fn foreseen(
     keys: &FeedforwardKeys,
     run: &RunPart,
     part: &ExtruderPart,
     cell: &str,
-    (transfer, about): (TransferFunction, OperatingPoint),
+    behaviour: Behaviour,
 ) -> Result<Foreseen, AssemblyError> {
+    let Behaviour { transfer, about } = behaviour;
     let extruder = &part.extruder;
     let settings = InverseSettings {
         time_constant_s: keys.time_constant_s,
@@ -244,7 +190,7 @@ fn forecast(
 /// A profile of commands; one of another quantity, or beyond the limits, is
 /// refused before anything moves.
 fn played(file: &ExtruderFile, part: &ExtruderPart) -> Result<Played, AssemblyError> {
-    let wrong = |what: String| AssemblyError::unfit(format!("{}: {what}", file.source));
+    let wrong = |what: String| wrong_file(file, &what);
     let (profile, quantity) =
         profile::file::parse(&file.text).map_err(|error| wrong(error.to_string()))?;
     let unit = part.extruder.drive.unit();

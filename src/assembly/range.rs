@@ -1,7 +1,8 @@
 //! Whether a cell uses its model where it was identified, and its profile as
 //! fast as its limits allow.
 
-use super::{AssemblyError, ExtruderSide};
+use super::error::AssemblyError;
+use super::side::ExtruderSide;
 use crate::cell::extruder::{ModelSource, Strategy};
 use crate::cell::file::ExtruderPart;
 use crate::core::units::MPa;

@@ -3,6 +3,7 @@
 use crate::core::time::Span;
 use crate::core::units::{Mm, MmPerS, MmPerS2};
 use crate::document::Table;
+use crate::vision::Gauge;
 use crate::width_control::limiter::Limits;
 use crate::width_control::pi::PiGains;
 use crate::width_control::settings::Control;
@@ -67,8 +68,9 @@ pub fn check_target(
     control: &Table<'_>,
     layers: Option<&Table<'_>>,
     target: &Target,
-    (low, high): (Mm, Mm),
+    gauge: &Gauge,
 ) {
+    let (low, high) = gauge.width_range;
     let outside = |width: &Mm| *width < low || *width > high;
     let report = |table: &Table<'_>, key: &'static str, width: Mm| {
         let expected = format!("within width_range_mm of [gauge], {low} to {high}");

@@ -3,6 +3,8 @@
 //! for limits.
 
 mod adaptive;
+mod command;
+mod context;
 mod link;
 mod part;
 mod plant;
@@ -13,10 +15,18 @@ mod strategy;
 
 use std::path::{Path, PathBuf};
 
+pub use adaptive::AdaptiveSettings;
+pub use context::Rates;
 pub use link::ExtruderLink;
-pub use part::{Beside, ExtruderPart};
-pub use plant::{ExtruderPlant, LinearPlant, MeltPlant, PlantKind, PressurePlant, ScrewPlant};
+pub use part::{BeadStart, Beside, ExtruderPart};
+pub use plant::{
+    ExtruderPlant, GainWave, InputLoad, LinearPlant, MeltPlant, PlantKind, PressurePlant,
+    ScrewPlant,
+};
 pub use strategy::{FeedforwardKeys, ModelSource, Strategy};
+
+use command::read_limits;
+use context::{About, read_rates};
 
 use crate::core::time::Span;
 use crate::core::units::{MPa, Mm, MmPerS};
@@ -25,9 +35,6 @@ use crate::extruder::demand::section;
 use crate::extruder::{
     CommandLimits, Drive, ExtruderSetup, FlowDemand, Follows, Law, ReadingFilters, RobotFollows,
 };
-
-/// Any number that a command of an extruder can be, as a bound on slips.
-const ANY: std::ops::RangeInclusive<f64> = -1e9..=1e9;
 
 /// The extruder side of a cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,46 +67,6 @@ pub struct Extruder {
     pub plan: Option<PathBuf>,
     /// How a live run reaches it, if the file says so.
     pub link: Option<ExtruderLink>,
-}
-
-/// How often what is done \[Hz\].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rates {
-    /// Steps of the feedforward.
-    pub feedforward_hz: f64,
-    /// Steps of the control.
-    pub control_hz: f64,
-    /// Commands and reports.
-    pub io_hz: f64,
-}
-
-/// The keys of a command's limits, which carry its unit.
-struct Keys {
-    value: &'static str,
-    min: &'static str,
-    max: &'static str,
-    rate: &'static str,
-}
-
-const fn keys(drive: Drive) -> Keys {
-    macro_rules! keys {
-        ($unit:literal) => {
-            Keys {
-                value: concat!("constant_", $unit),
-                min: concat!("min_", $unit),
-                max: concat!("max_", $unit),
-                rate: concat!("max_", $unit, "_per_s"),
-            }
-        };
-    }
-    match drive {
-        Drive::Rpm => keys!("rpm"),
-        Drive::Volts => keys!("v"),
-        Drive::Pressure => keys!("mpa"),
-        Drive::Flow => keys!("mm3_per_s"),
-        Drive::MassFlow => keys!("kg_per_s"),
-        Drive::Filling => keys!("filling"),
-    }
 }
 
 impl Extruder {
@@ -211,14 +178,6 @@ impl Extruder {
     }
 }
 
-/// What the reading of a strategy hangs on.
-struct About<'a> {
-    folder: &'a Path,
-    drive: Drive,
-    limits: Option<CommandLimits>,
-    rates: Rates,
-}
-
 /// A flow that follows the robot, and a robot that follows the flow, would lead
 /// each other to a stand.
 fn read_follows(table: &Table<'_>, robot_follows: Option<RobotFollows>) -> Option<Follows> {
@@ -235,32 +194,4 @@ fn read_follows(table: &Table<'_>, robot_follows: Option<RobotFollows>) -> Optio
         table.report("follows", "\"robot\"", expected);
     }
     follows
-}
-
-fn read_limits(table: &Table<'_>, drive: Drive) -> Option<CommandLimits> {
-    let keys = keys(drive);
-    let min = table.number(keys.min, ANY);
-    let max = table.number(keys.max, ANY);
-    let rate = table.number(keys.rate, 1e-9..=1e12);
-    let (min, max) = (min?, max?);
-    if min >= max {
-        table.report(keys.max, max.to_string(), format!("more than {} = {min}", keys.min));
-        return None;
-    }
-    CommandLimits::new(min, max, rate?).ok()
-}
-
-fn read_rates(table: &Table<'_>) -> Option<Rates> {
-    let hz = 0.5..=5000.0;
-    let feedforward = table.number_or("feedforward_rate_hz", hz.clone(), 200.0);
-    let control = table.number_or("control_rate_hz", hz.clone(), 20.0);
-    let io = table.number_or("io_rate_hz", hz, 50.0);
-    let rates = Rates { feedforward_hz: feedforward?, control_hz: control?, io_hz: io? };
-    for (key, rate) in [("control_rate_hz", rates.control_hz), ("io_rate_hz", rates.io_hz)] {
-        if rate > rates.feedforward_hz {
-            let most = format!("at most feedforward_rate_hz = {}", rates.feedforward_hz);
-            table.report(key, rate.to_string(), most);
-        }
-    }
-    Some(rates)
 }

@@ -10,7 +10,7 @@ mod robot;
 use std::path::Path;
 
 use super::control;
-use super::extruder::Beside;
+use super::extruder::{BeadStart, Beside};
 use crate::calibration::{Calibration, SurfaceMap};
 use crate::core::frame::Channel;
 use crate::core::units::Mm;
@@ -170,7 +170,7 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let target =
         control_table.as_ref().and_then(|t| control::read_course(t, layers.as_ref(), width));
     if let (Some(table), Some(target), Some(gauge)) = (&control_table, &target, &gauge) {
-        control::check_target(table, layers.as_ref(), target, gauge.width_range);
+        control::check_target(table, layers.as_ref(), target, gauge);
     }
     let control = control_table.as_ref().and_then(|t| control::read_control(t, target.clone()));
     let camera_table = root.run_table("camera");
@@ -186,7 +186,7 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     }
     let simulation = table::read(root);
     let speed = robot.as_ref().map(|robot| robot.start_speed);
-    let bead = width.zip(speed);
+    let bead = width.zip(speed).map(|(width, speed)| BeadStart { width, speed });
     let beside = Beside {
         bead,
         robot_address: robot.as_ref().map(|robot| robot.address.as_str()),

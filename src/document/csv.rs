@@ -1,7 +1,16 @@
 //! What is wrong with a table of separated values, in words.
 
-/// The line, counted from 1 with the heading, and what is wrong there.
-pub fn in_words(error: &csv::Error) -> (u64, String) {
+/// A line of a table that is wrong.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LineProblem {
+    /// Counted from 1, with the heading.
+    pub line: u64,
+    /// What is wrong there.
+    pub what: String,
+}
+
+/// What the parser says, in words.
+pub fn in_words(error: &csv::Error) -> LineProblem {
     let line = error.position().map_or(1, csv::Position::line);
     let what = match error.kind() {
         csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
@@ -11,5 +20,5 @@ pub fn in_words(error: &csv::Error) -> (u64, String) {
         csv::ErrorKind::Utf8 { .. } => "this is no text".to_owned(),
         _ => error.to_string(),
     };
-    (line, what)
+    LineProblem { line, what }
 }

@@ -7,13 +7,14 @@ use std::collections::BTreeSet;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::Document;
-use super::value::shown;
+use super::file_text::FileText;
+use super::keys::{alike, in_common};
+use super::scalar::shown;
 
 /// One table of a document. Keys that nobody asked for are violations, which
 /// are reported when the table is dropped.
 pub struct Table<'a> {
-    document: &'a Document<'a>,
+    text: &'a FileText<'a>,
     path: String,
     items: Option<&'a DeTable<'a>>,
     line: Option<usize>,
@@ -24,9 +25,9 @@ pub struct Table<'a> {
 
 impl<'a> Table<'a> {
     /// The outermost table of a document.
-    pub(super) fn root(document: &'a Document<'a>, items: &'a DeTable<'a>) -> Self {
+    pub(super) fn root(text: &'a FileText<'a>, items: &'a DeTable<'a>) -> Self {
         Table {
-            document,
+            text,
             path: String::new(),
             items: Some(items),
             line: None,
@@ -45,10 +46,10 @@ impl<'a> Table<'a> {
     fn child(&self, key: &'static str, items: Option<&'a DeTable<'a>>, strict: bool) -> Table<'a> {
         let value = self.get(key);
         Table {
-            document: self.document,
+            text: self.text,
             path: self.key_path(key),
             items,
-            line: value.map(|value| self.document.line_of(value.span().start)),
+            line: value.map(|value| self.text.line_of(value.span().start)),
             strict,
             asked: RefCell::default(),
             passed_over: Cell::new(false),
@@ -73,8 +74,8 @@ impl<'a> Table<'a> {
 
     /// Reports a violation at a key of this table.
     pub fn report(&self, key: &'static str, found: impl Into<String>, expected: impl Into<String>) {
-        let line = self.get(key).map_or(self.line, |v| Some(self.document.line_of(v.span().start)));
-        self.document.report(line, &self.key_path(key), found, expected);
+        let line = self.get(key).map_or(self.line, |v| Some(self.text.line_of(v.span().start)));
+        self.text.report(line, &self.key_path(key), found, expected);
     }
 
     /// Whether the key stands in the file.
@@ -101,7 +102,7 @@ impl<'a> Table<'a> {
     /// A table that only a run needs: there it must be and must be complete,
     /// elsewhere it may be absent or lack keys.
     pub fn run_table(&self, key: &'static str) -> Option<Table<'a>> {
-        if self.document.for_run {
+        if self.text.for_run() {
             return self.required_table(key);
         }
         let mut table = self.table(key)?;
@@ -113,7 +114,7 @@ impl<'a> Table<'a> {
     /// where it stands at all.
     pub fn optional_run_table(&self, key: &'static str) -> Option<Table<'a>> {
         let mut table = self.table(key)?;
-        table.strict = self.document.for_run;
+        table.strict = self.text.for_run();
         Some(table)
     }
 
@@ -137,7 +138,7 @@ impl Drop for Table<'_> {
             if asked.contains(name) {
                 continue;
             }
-            let line = self.document.line_of(key.span().start);
+            let line = self.text.line_of(key.span().start);
             let likely = asked.iter().filter(|known| alike(known, name));
             let near = likely.max_by_key(|known| in_common(known, name).iter().sum::<usize>());
             let expected = match near {
@@ -145,22 +146,7 @@ impl Drop for Table<'_> {
                 None if asked.is_empty() => "nothing here".to_string(),
                 None => format!("one of {}", asked.iter().copied().collect::<Vec<_>>().join(", ")),
             };
-            self.document.report(Some(line), &self.key_path(name), "an unknown key", expected);
+            self.text.report(Some(line), &self.key_path(name), "an unknown key", expected);
         }
     }
-}
-
-/// Letters that two keys share at their beginnings, and at their ends.
-fn in_common(known: &str, found: &str) -> [usize; 2] {
-    let beginning = known.bytes().zip(found.bytes()).take_while(|(a, b)| a == b).count();
-    let end = known.bytes().rev().zip(found.bytes().rev()).take_while(|(a, b)| a == b).count();
-    [beginning, end]
-}
-
-/// Whether an unknown key looks like a known one that was mistyped: same
-/// beginning, or the same letters but for one or two.
-fn alike(known: &str, found: &str) -> bool {
-    let [beginning, end] = in_common(known, found);
-    let longest = known.len().max(found.len());
-    beginning + end + 2 >= longest || (beginning >= 6 && beginning * 2 >= longest)
 }

@@ -1,7 +1,7 @@
 //! Logged data as a table with named columns. Lines are counted as an editor
 //! counts them, the names being line 1.
 
-use crate::document::csv::in_words;
+use crate::document::csv::{LineProblem, in_words};
 
 /// What is wrong with a table.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -161,7 +161,7 @@ fn number(cell: &str) -> Option<f64> {
 }
 
 fn of_line(error: &csv::Error) -> TableError {
-    let (line, what) = in_words(error);
+    let LineProblem { line, what } = in_words(error);
     TableError::Line { line, what }
 }
 

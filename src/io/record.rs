@@ -14,9 +14,12 @@
 //! unbroken beginning of its run. What has been taken reaches the operating
 //! system within half a second.
 
+mod config;
 mod encode;
 pub mod format;
 mod mux;
+mod report;
+mod shared;
 pub mod sink;
 mod tap;
 mod writer;
@@ -25,134 +28,28 @@ mod writer;
 mod tests;
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
-use std::time::Duration;
 
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 
-use crate::cell::file::KeepFrames;
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::frame::Frame;
 use crate::core::time::Stamp;
 use crate::run::ports::{RecordError, Recorder};
+use config::Tuning;
+pub use config::{ExtruderFile, RecordConfig};
 use encode::FrameJob;
 use format::{CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, FORMAT_VERSION, RunInfo};
 use mux::Mux;
+use report::Counts;
+pub use report::{Incomplete, RecordReport};
+use shared::{Answered, Shared};
 use sink::{FileSink, Outlet, Sink};
 pub use tap::FrameTap;
 use writer::{Inputs, WriterThread};
-
-/// What is recorded about the run itself, and which frames.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RecordConfig {
-    /// Which frames are kept.
-    pub frames: KeepFrames,
-    /// Wall clock at stamp 0 \[ns since 1970\].
-    pub epoch_ns: u64,
-    /// The cell file as the command named it.
-    pub cell_name: String,
-    /// The cell file's text.
-    pub cell_text: String,
-    /// The calibration file's text, where the cell has one.
-    pub calibration_text: Option<String>,
-    /// The files that the cell names for its extruder.
-    pub extruder_files: Vec<ExtruderFile>,
-}
-
-/// A file that the extruder side of a controller is made from.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ExtruderFile {
-    /// What it is called in a recording, such as [`format::MODEL_ATTACHMENT`].
-    pub name: &'static str,
-    /// What messages call it.
-    pub source: String,
-    /// Its text.
-    pub text: String,
-}
-
-/// What a finished recording holds.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RecordReport {
-    /// Events.
-    pub events: u64,
-    /// Steps.
-    pub steps: u64,
-    /// Frames.
-    pub frames_kept: u64,
-    /// Frames that should have been kept, but for which there was no time.
-    pub frames_dropped: u64,
-    /// Size of the file.
-    pub bytes: u64,
-    /// Where it is.
-    pub path: PathBuf,
-}
-
-/// A recording that misses the end of its run. It is readable up to there, and
-/// keeps the name of a partial one.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{why}; {} holds the first {} events", report.path.display(), report.events)]
-pub struct Incomplete {
-    /// Why.
-    pub why: RecordError,
-    /// What there is.
-    pub report: RecordReport,
-}
-
-/// Sizes and times, which tests make small.
-#[derive(Debug, Clone, Copy)]
-struct Tuning {
-    flush_every: Duration,
-    events: usize,
-    frames: usize,
-    encoded: usize,
-}
-
-impl Default for Tuning {
-    fn default() -> Self {
-        Self { flush_every: Duration::from_millis(400), events: 4096, frames: 8, encoded: 4 }
-    }
-}
-
-/// An event and its answer, on the way to the writer.
-struct Answered {
-    n: u64,
-    now: Stamp,
-    event: Event,
-    step: Step,
-}
-
-#[derive(Debug, Clone, Copy, Default)]
-struct Counts {
-    events: u64,
-    steps: u64,
-    frames: u64,
-}
-
-/// What the threads know in common.
-struct Shared {
-    failure: OnceLock<RecordError>,
-    alarm: Sender<RecordError>,
-    frames_dropped: AtomicU64,
-}
-
-impl Shared {
-    /// The first failure counts, is told once, and is what comes back.
-    fn fail(&self, why: RecordError) -> RecordError {
-        if self.failure.set(why.clone()).is_ok() {
-            tracing::error!("recording ends here: {}", why.0);
-            // The channel holds one, and there is only one.
-            self.alarm.try_send(why.clone()).unwrap_or_default();
-        }
-        self.failure().cloned().unwrap_or(why)
-    }
-
-    fn failure(&self) -> Option<&RecordError> {
-        self.failure.get()
-    }
-}
 
 /// The recorder as the control thread holds it. Dropping it finishes the
 /// recording as [`Self::finish`] does, but tells nobody how that went.
@@ -202,8 +99,7 @@ fn start_with<S: Sink + 'static>(
         .map_err(|error| RecordError(format!("cannot write {}: {error}", path.display())))?;
 
     let (alarm, alarms) = bounded(1);
-    let shared =
-        Arc::new(Shared { failure: OnceLock::new(), alarm, frames_dropped: AtomicU64::new(0) });
+    let shared = Arc::new(Shared::new(alarm));
     let (answered, answered_out) = bounded(tuning.events);
     let (jobs, jobs_out) = bounded(tuning.frames);
     let (encoded, encoded_out) = bounded(tuning.encoded);

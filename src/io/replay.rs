@@ -45,6 +45,14 @@ pub struct ReplayReport {
     pub unanswered: Option<u64>,
 }
 
+/// An event that was given to the controller and whose recorded step is to come.
+struct Pending {
+    n: u64,
+    now: Stamp,
+    event: Event,
+    replayed: Step,
+}
+
 /// Replays a recording. `step` is the controller, fresh from its
 /// configuration. Fails where the recording cannot be read on.
 pub fn replay(
@@ -52,21 +60,23 @@ pub fn replay(
     mut step: impl FnMut(Stamp, &Event) -> Step,
 ) -> Result<ReplayReport, RecordingError> {
     let mut report = ReplayReport::default();
-    let mut open: Option<(u64, Stamp, Event, Step)> = None;
+    let mut pending: Option<Pending> = None;
     for entry in entries {
         match entry? {
             Entry::Frame(_) => {}
             Entry::Event { n, now, event } => {
                 let expected = report.compared;
-                if open.is_some() || n != expected {
+                if pending.is_some() || n != expected {
                     report.gap = Some(Gap { expected, found: n });
                     return Ok(report);
                 }
                 let replayed = step(now, &event);
-                open = Some((n, now, event, replayed));
+                pending = Some(Pending { n, now, event, replayed });
             }
             Entry::Step { n, step: recorded, .. } => {
-                let Some((_, now, event, replayed)) = open.take_if(|(open, ..)| *open == n) else {
+                let Some(Pending { now, event, replayed, .. }) =
+                    pending.take_if(|open| open.n == n)
+                else {
                     report.gap = Some(Gap { expected: report.compared, found: n });
                     return Ok(report);
                 };
@@ -79,7 +89,7 @@ pub fn replay(
             }
         }
     }
-    report.unanswered = open.map(|(n, ..)| n);
+    report.unanswered = pending.map(|open| open.n);
     Ok(report)
 }
 

@@ -1,7 +1,7 @@
 //! The planned profile of a job from a table: path length, position and nominal speed.
 
 use super::profile::{ProfileError, SpeedProfile};
-use crate::document::csv::in_words;
+use crate::document::csv::{LineProblem, in_words};
 
 /// Columns that are read; others are left alone.
 const PATH: &str = "path_mm";
@@ -128,7 +128,7 @@ fn check_way(
 }
 
 fn of_row(error: &csv::Error) -> JobError {
-    let (line, what) = in_words(error);
+    let LineProblem { line, what } = in_words(error);
     JobError::Row { line, what }
 }
 

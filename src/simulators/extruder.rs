@@ -3,20 +3,21 @@
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
+use super::machine::Notice;
 use super::server::Server;
-use crate::core::time::{Span, Stamp};
+use crate::core::time::Span;
 use crate::extruder::{ExtruderCommand, PumpMode};
 use crate::io::clock::RunClock;
 use crate::link::extruder::{ExtruderHello, Faults, Gate};
-use crate::run::ports::ExtruderPort;
 use crate::sim::extruder::SimExtruder;
 
 mod machine;
+mod shared;
 
-pub use super::server::Notice;
 use machine::ExtruderMachine;
+use shared::{Shared, Works};
 
 /// What is simulated.
 #[derive(Debug)]
@@ -52,59 +53,6 @@ pub struct ExtruderSim {
     server: Server,
 }
 
-/// What the extruder's thread shares with the handle.
-#[derive(Debug)]
-struct Shared {
-    clock: RunClock,
-    works: Mutex<Works>,
-}
-
-/// The link's gate and what stands behind it.
-#[derive(Debug)]
-struct Works {
-    gate: Gate,
-    plant: SimExtruder,
-    told: ExtruderCommand,
-    fails_after: Option<Span>,
-    ran_since: Option<Stamp>,
-}
-
-impl Shared {
-    fn works(&self) -> MutexGuard<'_, Works> {
-        self.works.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Works {
-    /// Goes on to a moment: the plant is told what the gate lets through.
-    fn advance(&mut self, now: Stamp) {
-        if let (Some(after), Some(since)) = (self.fails_after, self.ran_since)
-            && now - since >= after
-        {
-            self.fails_after = None;
-            self.gate.fail();
-        }
-        // A command ends where it runs out, however long nobody looked.
-        if let Some(until) = self.gate.runs_out().filter(|&until| until < now) {
-            self.obey(until);
-        }
-        self.obey(now);
-        if self.ran_since.is_none() && self.told.pump_on {
-            self.ran_since = Some(now);
-        }
-    }
-
-    /// Goes on to a moment and does what the gate lets through there.
-    fn obey(&mut self, at: Stamp) {
-        self.plant.advance(at);
-        let command = self.gate.command(at);
-        if command != self.told {
-            self.told = command;
-            let _ = self.plant.send(at, command);
-        }
-    }
-}
-
 impl ExtruderSim {
     /// Serves the link on `listener`. `clock` may be the PC's own: what the
     /// extruder says of its time is shifted by
@@ -118,16 +66,9 @@ impl ExtruderSim {
         if options.state_period <= Span::ZERO {
             return Err(ExtruderSimError::Period);
         }
-        let mut gate = Gate::new(options.hello, options.clock_start_ms);
-        let told = gate.command(clock.now());
-        let works = Works {
-            gate,
-            plant: options.plant,
-            told,
-            fails_after: options.fails_after,
-            ran_since: None,
-        };
-        let shared = Arc::new(Shared { clock, works: Mutex::new(works) });
+        let gate = Gate::new(options.hello, options.clock_start_ms);
+        let works = Works::new(clock.now(), gate, options.plant, options.fails_after);
+        let shared = Arc::new(Shared::new(clock, works));
         let machine = ExtruderMachine::new(Arc::clone(&shared));
         let server = Server::spawn(listener, clock, options.state_period, machine, notice)?;
         Ok(Self { shared, server })
@@ -142,24 +83,24 @@ impl ExtruderSim {
     pub fn pump(&self) -> PumpMode {
         let mut works = self.shared.works();
         works.advance(self.shared.clock.now());
-        works.plant.state().0
+        works.plant().state().0
     }
 
     /// What pump and valve are told now.
     pub fn command(&self) -> ExtruderCommand {
         let mut works = self.shared.works();
         works.advance(self.shared.clock.now());
-        works.told
+        works.command()
     }
 
     /// The pump fails.
     pub fn fail(&self) {
-        self.shared.works().gate.fail();
+        self.shared.works().gate().fail();
     }
 
     /// Misbehaves from now on.
     pub fn set_faults(&self, faults: Faults) {
-        self.shared.works().gate.set_faults(faults);
+        self.shared.works().gate().set_faults(faults);
     }
 
     /// Closes all sockets and ends the threads.

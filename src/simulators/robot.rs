@@ -1,24 +1,23 @@
 //! A robot that is not there: [`RobotCell`] behind a real TCP socket.
 
-use std::collections::VecDeque;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
+use super::machine::Notice;
 use super::server::Server;
 use crate::core::robot::{RobotMode, RobotState};
-use crate::core::time::{Span, Stamp};
+use crate::core::time::Span;
 use crate::core::units::Mm;
 use crate::io::clock::RunClock;
 use crate::link::{Faults, Job, ParamError, RobotCell, RobotParams};
 
 mod machine;
+mod shared;
 
-pub use super::server::Notice;
 use machine::RobotMachine;
-
-/// Samples of the truth that are kept; at 50 a second more than an hour.
-const LONGEST_HISTORY: usize = 200_000;
+use shared::Shared;
+pub use shared::Truth;
 
 /// What is simulated.
 #[derive(Debug, Clone)]
@@ -30,15 +29,6 @@ pub struct SimOptions {
     /// Time between two `STATE` lines, 20 to 200 ms on a robot that keeps to
     /// the link.
     pub state_period: Span,
-}
-
-/// Where the robot really was.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Truth {
-    /// When.
-    pub at: Stamp,
-    /// Its state.
-    pub state: RobotState,
 }
 
 /// The robot cannot be started.
@@ -62,32 +52,6 @@ pub struct RobotSim {
     server: Server,
 }
 
-/// What the robot's thread shares with the handle.
-#[derive(Debug)]
-struct Shared {
-    clock: RunClock,
-    cell: Mutex<RobotCell>,
-    history: Mutex<VecDeque<Truth>>,
-}
-
-impl Shared {
-    fn cell(&self) -> MutexGuard<'_, RobotCell> {
-        self.cell.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn history(&self) -> MutexGuard<'_, VecDeque<Truth>> {
-        self.history.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn remember(&self, at: Stamp, state: RobotState) {
-        let mut history = self.history();
-        if history.len() == LONGEST_HISTORY {
-            history.pop_front();
-        }
-        history.push_back(Truth { at, state });
-    }
-}
-
 impl RobotSim {
     /// Serves the link on `listener`. `clock` may be the PC's own: what the
     /// robot says of its time is shifted by
@@ -102,7 +66,7 @@ impl RobotSim {
             return Err(SimError::Period);
         }
         let cell = RobotCell::new(options.params, clock.now())?;
-        let shared = Arc::new(Shared { clock, cell: Mutex::new(cell), history: Mutex::default() });
+        let shared = Arc::new(Shared::new(clock, cell));
         let machine = RobotMachine::new(Arc::clone(&shared), options.job);
         let server = Server::spawn(listener, clock, options.state_period, machine, notice)?;
         Ok(Self { shared, server })

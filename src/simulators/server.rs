@@ -10,67 +10,21 @@ use std::time::Duration;
 
 use crossbeam_channel::{Sender, after, bounded};
 
-use crate::core::time::{Span, Stamp};
+use super::machine::{Machine, Notice};
+use crate::core::time::Span;
 use crate::io::clock::RunClock;
-use crate::link::{ErrCode, LineError};
 
 mod host;
+mod input;
 mod peer;
 
-use host::{Host, Input};
+use host::Host;
+use input::Input;
 
 /// Pieces of input that may wait; senders then wait too.
 const WAITING_INPUTS: usize = 64;
 /// How long a call on the server's own socket may take when it is woken to end.
 const WAKE: Duration = Duration::from_millis(200);
-
-/// Is told what happens, in words for the person who watches.
-pub type Notice = Box<dyn FnMut(Stamp, &str) + Send>;
-
-/// What stands behind a server.
-pub trait Machine: Send + 'static {
-    /// Name of its threads.
-    const NAME: &'static str;
-    /// What a PC leaves behind, such as `the last setpoint`.
-    const LEFT: &'static str;
-
-    /// Once every period: goes on, and gives the `STATE` to send, if there is
-    /// somebody to hear it.
-    fn tick(&mut self, now: Stamp) -> Option<String>;
-
-    /// A PC called.
-    fn connected(&mut self, now: Stamp);
-
-    /// The PC is gone.
-    fn disconnected(&mut self, now: Stamp);
-
-    /// Takes a line without LF; fails where it makes no sense.
-    fn take(&mut self, now: Stamp, text: &str) -> Result<Taken, LineError>;
-
-    /// The answer to bytes that make no line.
-    fn bad_line(&mut self, why: &str) -> Answer;
-
-    /// What has changed since it was last asked, in words, if anything.
-    fn news(&mut self, now: Stamp) -> Option<String>;
-}
-
-/// What became of a line.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Taken {
-    /// What to answer.
-    pub answer: Option<Answer>,
-    /// Whether it was the last one.
-    pub bye: bool,
-}
-
-/// A line to the PC.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Answer {
-    /// The line with its LF.
-    pub line: String,
-    /// Number of the line that it refuses, and why, where it does.
-    pub refused: Option<(u64, ErrCode, String)>,
-}
 
 /// A machine that is served in threads of its own until it is stopped.
 #[derive(Debug)]

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::{Known, Log};
 use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::{Span, Stamp};
-use crate::link::motion::{Drive, Motion};
+use crate::link::robot::motion::{Drive, Motion};
 
 /// Dead times and lags that are tried \[s\].
 const MOST_DEAD_S: f64 = 0.8;

@@ -3,7 +3,8 @@
 
 use std::sync::Arc;
 
-use crate::assembly::AssemblyError;
+use super::behaviour::wrong_file;
+use crate::assembly::error::AssemblyError;
 use crate::cell::file::{ExtruderPart, RunPart};
 use crate::extruder::trajectory::PlannedJob;
 use crate::io::record::ExtruderFile;
@@ -21,7 +22,7 @@ pub fn plan(
     part: &ExtruderPart,
     file: &ExtruderFile,
 ) -> Result<Arc<PlannedJob>, AssemblyError> {
-    let wrong = |what: String| AssemblyError::unfit(format!("{}: {what}", file.source));
+    let wrong = |what: String| wrong_file(file, &what);
     let job = PlannedJob::parse(&file.text).map_err(|error| wrong(error.to_string()))?;
     let unit = part.extruder.drive.unit();
     if job.unit != unit {

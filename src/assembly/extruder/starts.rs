@@ -1,6 +1,6 @@
 //! How a cell times the starts and stops of its beads.
 
-use crate::assembly::AssemblyError;
+use crate::assembly::error::AssemblyError;
 use crate::cell::file::{ExtruderPart, RunPart};
 use crate::core::readback::ROBOT_LAG;
 use crate::core::time::Span;

@@ -1,17 +1,25 @@
 //! `[extruder.adaptive]`: the plant that the adaptive law of the nozzle is made
 //! for, and its gains. There are no defaults for gains.
 
-use super::About;
+use super::command::ANY;
+use super::context::About;
 use crate::core::time::Span;
 use crate::core::units::Mm2;
 use crate::document::Table;
 use crate::extruder::adaptive::{Adaptation, AdaptiveLaw, Gains, Safety, ScalarPlant};
 use crate::extruder::law::NozzleModel;
 
-const ANY: std::ops::RangeInclusive<f64> = -1e9..=1e9;
+/// The adaptive controller of a nozzle, and that nozzle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AdaptiveSettings {
+    /// What adapts.
+    pub controller: AdaptiveLaw,
+    /// What its plant's state makes flow.
+    pub nozzle: NozzleModel,
+}
 
-/// The law and its nozzle. The law's own conditions are checked here.
-pub(super) fn read(table: &Table<'_>, about: &About<'_>) -> Option<(AdaptiveLaw, NozzleModel)> {
+/// Reads the table. The controller's own conditions are checked here.
+pub(super) fn read(table: &Table<'_>, about: &About<'_>) -> Option<AdaptiveSettings> {
     let state = table.number("state_gain_per_s", ANY);
     let input = table.number("input_gain", ANY);
     let feedback = table.number("feedback", ANY);
@@ -38,9 +46,10 @@ pub(super) fn read(table: &Table<'_>, about: &About<'_>) -> Option<(AdaptiveLaw,
     let plant = ScalarPlant { state_gain_per_s: state?, input_gain: input? };
     let hold = Span::from_secs(1.0 / about.rates.control_hz);
     match AdaptiveLaw::new(plant, gains, hold) {
-        Ok(law) => {
+        Ok(controller) => {
             let section = Mm2::new(section?).ok()?;
-            Some((law, NozzleModel { section, pressure_kg_per_s: pressure? }))
+            let nozzle = NozzleModel { section, pressure_kg_per_s: pressure? };
+            Some(AdaptiveSettings { controller, nozzle })
         }
         Err(error) => {
             table.report("feedback", gains.feedback.to_string(), error.to_string());

@@ -23,11 +23,20 @@ pub struct ExtruderPart {
     pub plant_nominal: Mm3PerS,
 }
 
+/// A bead as it begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BeadStart {
+    /// Its width.
+    pub width: Mm,
+    /// Speed at which it begins.
+    pub speed: MmPerS,
+}
+
 /// What stands beside the extruder in its cell; none of what could not be read.
 #[derive(Debug, Clone, Copy)]
 pub struct Beside<'a> {
-    /// Width of the bead, and the speed at which it begins.
-    pub bead: Option<(Mm, MmPerS)>,
+    /// The bead.
+    pub bead: Option<BeadStart>,
     /// Host and port of the robot.
     pub robot_address: Option<&'a str>,
     /// The simulated bead.
@@ -60,8 +69,8 @@ impl ExtruderPart {
             let expected = "another than robot.address: each has a controller of its own";
             table.report("address", format!("\"{}\"", link.address), expected);
         }
-        let (target, speed) = beside.bead?;
-        let demand = extruder.demand(&table, target, speed)?;
+        let BeadStart { width, speed } = beside.bead?;
+        let demand = extruder.demand(&table, width, speed)?;
         let model = beside.simulation?.bead;
         let (width, at) =
             (Mm::new(model.width_mm).ok()?, MmPerS::new(model.at_speed_mm_per_s).ok()?);

@@ -69,10 +69,28 @@ pub struct PressurePlant {
     pub fastest: Rpm,
     /// Noise of the sensor \[MPa\].
     pub sensor_noise_mpa: f64,
-    /// A wave of the gain, as a share of it, and its period \[s\].
-    pub gain_wave: (f64, f64),
-    /// A load at the input of the process \[rpm\], and when it comes \[s\].
-    pub load: (f64, f64),
+    /// A wave of the gain.
+    pub gain_wave: GainWave,
+    /// A load at the input of the process.
+    pub load: InputLoad,
+}
+
+/// A sine by which a gain swells and falls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GainWave {
+    /// Amplitude as a fraction of the gain.
+    pub fraction: f64,
+    /// Period \[s\].
+    pub period_s: f64,
+}
+
+/// A step at the input of a process that its controller does not know of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InputLoad {
+    /// Its height \[rpm\].
+    pub rpm: f64,
+    /// When it comes \[s\].
+    pub at_s: f64,
 }
 
 /// Melt that recedes in pauses and drools after stops, in a simulated cell.
@@ -260,8 +278,8 @@ fn read_pressure_plant(table: &Table<'_>) -> Option<PressurePlant> {
         nozzle: nozzle?,
         fastest: Rpm::new(fastest?).ok()?,
         sensor_noise_mpa: noise?,
-        gain_wave: (wave?, period?),
-        load: (load?, load_at?),
+        gain_wave: GainWave { fraction: wave?, period_s: period? },
+        load: InputLoad { rpm: load?, at_s: load_at? },
     })
 }
 

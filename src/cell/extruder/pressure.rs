@@ -1,7 +1,7 @@
 //! `[extruder.pressure]`: the process from the screw's speed to the pressure at
 //! the nozzle, the nozzle's power law, and which law holds the pressure.
 
-use super::About;
+use super::context::About;
 use crate::document::Table;
 use crate::extruder::law::{PressureChoice, PressureSettings};
 use crate::extruder::pressure::Fopdt;

@@ -1,7 +1,7 @@
 //! `[extruder.screw]`: a screw as its maker describes it, and what is asked of
 //! its predictor; and the same screw in a simulated cell.
 
-use super::About;
+use super::context::About;
 use crate::core::time::Span;
 use crate::core::units::{Mm, Rpm};
 use crate::document::Table;

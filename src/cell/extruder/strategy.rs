@@ -2,14 +2,16 @@
 
 use std::path::PathBuf;
 
-use super::{ANY, About, adaptive, keys, pressure, screw};
+use super::adaptive::AdaptiveSettings;
+use super::command::{ANY, keys};
+use super::context::About;
+use super::{adaptive, pressure, screw};
 use crate::core::quantity::Unit;
 use crate::core::time::Span;
 use crate::document::Table;
 use crate::extruder::Drive;
-use crate::extruder::adaptive::AdaptiveLaw;
 use crate::extruder::feedforward::{RightZeros, ScrewSpeed};
-use crate::extruder::law::{NozzleModel, PressureSettings};
+use crate::extruder::law::PressureSettings;
 use crate::extruder::rheology::DragFlow;
 use crate::extruder::screw::control::ScrewSettings;
 use crate::identify::library::{TOLERANCE_C, Wanted};
@@ -34,7 +36,7 @@ pub enum Strategy {
     /// The predictor of a screw.
     Screw(Box<ScrewSettings>),
     /// The adaptive law of the nozzle.
-    Adaptive(Box<(AdaptiveLaw, NozzleModel)>),
+    Adaptive(Box<AdaptiveSettings>),
 }
 
 impl Strategy {

@@ -2,13 +2,13 @@
 
 use super::PlanArgs;
 use super::job::{Bead, wrong};
+use crate::assembly::extruder::Behaviour;
 use crate::assembly::{LoadedCell, extruder};
 use crate::cell::extruder::Strategy;
 use crate::cell::file::{ExtruderPart, Purpose, RunPart};
 use crate::cli::WrongArguments;
 use crate::extruder::CommandLimits;
 use crate::extruder::demand::section;
-use crate::extruder::law::OperatingPoint;
 use crate::identify::file as model;
 use crate::io::record::ExtruderFile;
 use crate::numeric::lti::TransferFunction;
@@ -82,8 +82,9 @@ impl Extruder {
         args: &PlanArgs,
         (run, part): (&RunPart, &ExtruderPart),
         (name, identified): (String, Option<Identified>),
-        (transfer, about): (TransferFunction, OperatingPoint),
+        behaviour: Behaviour,
     ) -> anyhow::Result<Self> {
+        let Behaviour { transfer, about } = behaviour;
         if !run.control.target.is_constant() {
             let what = format!("{name}: found a target that changes, expected one target_width_mm");
             return Err(WrongArguments::new(what).into());

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{PlannedCourse, PlannedJob, Row};
 use crate::core::quantity::Unit;
-use crate::document::csv::in_words;
+use crate::document::csv::{LineProblem, in_words};
 
 /// How the column of the command begins; its end is the unit.
 const COMMAND: &str = "command_";
@@ -112,7 +112,7 @@ impl Columns {
 pub fn read(text: &str) -> Result<PlannedJob, TableError> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let of_row = |error: csv::Error| {
-        let (line, what) = in_words(&error);
+        let LineProblem { line, what } = in_words(&error);
         TableError::Row { line, what }
     };
     let (columns, unit) = Columns::of(reader.headers().map_err(of_row)?)?;

@@ -15,7 +15,8 @@ use super::format::{
     EVENT_SCHEMA, EVENT_TOPIC, EventMessage, IMAGE_TOPIC, PROFILE_ATTACHMENT, RUN_METADATA,
     RunInfo, STEP_SCHEMA, STEP_TOPIC, StepMessage,
 };
-use super::{Answered, Counts};
+use super::report::Counts;
+use super::shared::Answered;
 use crate::core::time::Stamp;
 use crate::io::foxglove;
 

@@ -5,8 +5,8 @@ use std::sync::atomic::Ordering;
 
 use crossbeam_channel::Sender;
 
-use super::Shared;
 use super::encode::FrameJob;
+use super::shared::Shared;
 use crate::cell::file::KeepFrames;
 use crate::core::frame::Frame;
 

@@ -1,6 +1,8 @@
 use std::io::Cursor;
+use std::time::Duration;
 
 use super::*;
+use crate::cell::file::KeepFrames;
 use crate::control::step::{State, Trace};
 use crate::core::frame::{Channel, Pixels};
 use crate::core::robot::{RobotLimits, RobotMode, RobotState};
@@ -9,7 +11,7 @@ use crate::io::image_file;
 use crate::io::recording::{Entry, Recording};
 
 mod disk;
-mod trouble;
+mod disk_faults;
 
 use disk::Disk;
 

@@ -7,10 +7,12 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, never, select_biased};
 
+use super::config::Tuning;
 use super::encode::EncodedFrame;
 use super::mux::{Mux, MuxError};
+use super::report::{Counts, RecordReport};
+use super::shared::{Answered, Shared};
 use super::sink::{Outlet, Sink};
-use super::{Answered, Counts, RecordReport, Shared, Tuning};
 use crate::run::ports::RecordError;
 
 /// What the writer listens to.

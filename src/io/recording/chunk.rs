@@ -2,15 +2,16 @@
 
 use std::collections::VecDeque;
 
-use ::mcap::records::op;
+use ::mcap::records::{Record, op};
 use ::mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-
-use super::stream::OwnedRecord;
 
 /// Largest chunk that is unpacked; a larger one is a damaged length.
 const MAX_CHUNK_BYTES: usize = 1 << 28;
 /// Shortest attachment: two times, two empty strings, a length and a CRC.
 const MIN_ATTACHMENT_BYTES: usize = 36;
+
+/// A record with its data owned.
+pub type OwnedRecord = Record<'static>;
 
 /// Unpacks a chunk, checks its CRC, and only then gives out its records.
 pub fn records(body: &[u8], out: &mut VecDeque<OwnedRecord>) -> Result<(), String> {

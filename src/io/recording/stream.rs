@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 use std::io::{self, Read, Seek, SeekFrom};
 
 use ::mcap::MAGIC;
-use ::mcap::records::{Record, op};
+use ::mcap::records::op;
 
-use super::chunk;
+use super::chunk::{self, OwnedRecord};
 
 /// Largest record that is taken; a longer one is a damaged length.
 const MAX_RECORD_BYTES: u64 = 1 << 30;
@@ -67,9 +67,6 @@ impl Integrity {
         }
     }
 }
-
-/// A record with its data owned.
-pub type OwnedRecord = Record<'static>;
 
 /// Records of a file in its order, those of a chunk in its place.
 pub struct RecordStream<R> {

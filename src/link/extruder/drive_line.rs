@@ -1,11 +1,10 @@
 //! Lines from the PC to the extruder.
 
-use super::{decimal, switch};
+use super::numbers::{NUMBERS, switch};
 use crate::extruder::ExtruderCommand;
-use crate::link::fields::{Fields, LineError};
-use crate::link::pc_line::PcLine;
+use crate::link::frame::{BYE_LINE, Fields, LineError, hello_line, read_hello};
 
-const KEYWORDS: &str = "HELLO, DRIVE or BYE";
+const KEYWORDS: [&str; 3] = ["HELLO", "DRIVE", "BYE"];
 
 /// A line from the PC to the extruder.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,15 +29,11 @@ pub enum DriveLine {
 impl DriveLine {
     /// Reads a line without its LF. The name after `HELLO 1` may be any word.
     pub fn parse(text: &str) -> Result<Self, LineError> {
-        let mut words = text.split(' ');
-        match words.next().unwrap_or_default() {
-            "" => Err(LineError::Empty),
-            "HELLO" | "BYE" => PcLine::parse(text).map(|line| match line {
-                PcLine::Hello => Self::Hello,
-                _ => Self::Bye,
-            }),
-            "DRIVE" => parse_drive(Fields::new("DRIVE", words)),
-            found => Err(LineError::Keyword { found: found.to_owned(), expected: KEYWORDS }),
+        let fields = Fields::open(text, &KEYWORDS, "HELLO, DRIVE or BYE")?;
+        match fields.keyword() {
+            "HELLO" => read_hello(fields, Self::Hello),
+            "DRIVE" => parse_drive(fields),
+            _ => fields.end(Self::Bye),
         }
     }
 
@@ -46,13 +41,13 @@ impl DriveLine {
     /// keep six decimals.
     pub fn format(&self) -> String {
         match *self {
-            Self::Hello => PcLine::Hello.format(),
+            Self::Hello => hello_line(),
             Self::Drive { seq, command, valid_ms, ref_t_ms } => {
                 let (pump, valve) = (switch(command.pump_on), switch(command.valve_open));
-                let value = decimal(command.value);
+                let value = NUMBERS.write(command.value);
                 format!("DRIVE {seq} {value} {pump} {valve} {valid_ms} {ref_t_ms}\n")
             }
-            Self::Bye => PcLine::Bye.format(),
+            Self::Bye => BYE_LINE.to_owned(),
         }
     }
 }
@@ -72,8 +67,8 @@ fn parse_drive(mut fields: Fields<'_>) -> Result<DriveLine, LineError> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::on_wire;
     use super::*;
+    use crate::link::extruder::on_wire;
     use crate::link::{LineSplitter, MAX_LINE};
 
     #[test]

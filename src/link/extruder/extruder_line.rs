@@ -1,13 +1,12 @@
 //! Lines from the extruder to the PC.
 
-use super::{decimal, switch};
+use super::numbers::{NUMBERS, switch};
 use crate::core::units::{MPa, Mm, Mm3PerS, Rpm};
 use crate::extruder::{Drive, ExtruderReport, PumpMode};
-use crate::link::VERSION;
-use crate::link::fields::{Fields, LineError};
-use crate::link::robot_line::{ErrCode, format_err, one_word, parse_err};
+use crate::link::frame::{DeviceLine, Fields, LineBody, LineError, one_word};
 
-const KEYWORDS: &str = "HELLO, STATE or ERR";
+/// A line from the extruder to the PC; a `STATE` comes every 5 to 200 ms.
+pub type ExtruderLine = DeviceLine<ExtruderHello, ExtruderStatus>;
 
 /// What an extruder says of itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,97 +33,60 @@ pub struct ExtruderStatus {
     pub report: ExtruderReport,
 }
 
-/// A line from the extruder to the PC.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ExtruderLine {
-    /// Answer to the PC's `HELLO`.
-    Hello(ExtruderHello),
-    /// What the extruder does, every 5 to 200 ms.
-    State(ExtruderStatus),
-    /// A refused line.
-    Err {
-        /// Number of the refused line; 0 where it had none that could be read.
-        seq: u64,
-        /// Why.
-        code: ErrCode,
-        /// Why, for the operator.
-        text: String,
-    },
-}
-
-impl ExtruderLine {
-    /// Reads a line without its LF.
-    pub fn parse(text: &str) -> Result<Self, LineError> {
-        let mut words = text.split(' ');
-        match words.next().unwrap_or_default() {
-            "" => Err(LineError::Empty),
-            "HELLO" => parse_hello(Fields::new("HELLO", words)),
-            "STATE" => parse_state(Fields::new("STATE", words)),
-            "ERR" => {
-                let (seq, code, text) = parse_err(Fields::new("ERR", words))?;
-                Ok(Self::Err { seq, code, text })
-            }
-            found => Err(LineError::Keyword { found: found.to_owned(), expected: KEYWORDS }),
+impl LineBody for ExtruderHello {
+    fn read(fields: &mut Fields<'_>) -> Result<Self, LineError> {
+        let name = fields.word("name")?.to_owned();
+        let word = fields.word("unit")?;
+        let expected = "rpm, v, mpa, mm3_per_s, kg_per_s or filling";
+        let drive =
+            Drive::of_unit_word(word).ok_or_else(|| fields.wrong("unit", expected, word))?;
+        let min = fields.number("min")?;
+        let max = fields.number("max")?;
+        if min > max {
+            return Err(LineError::Range { min, max });
         }
+        Ok(Self { name, drive, min, max })
     }
 
-    /// The line with its LF, at most [`crate::link::MAX_LINE`] bytes. Numbers
-    /// keep six decimals, a name becomes one word, a text is cut where it is
-    /// too long.
-    pub fn format(&self) -> String {
-        match self {
-            Self::Hello(hello) => {
-                let (unit, name) = (hello.drive.unit_word(), one_word(&hello.name, "extruder"));
-                let (min, max) = (decimal(hello.min), decimal(hello.max));
-                format!("HELLO {VERSION} {name} {unit} {min} {max}\n")
-            }
-            Self::State(ExtruderStatus { t_ms, seq, report }) => {
-                let (pump, valve) = (pump_word(report.pump), switch(report.valve_open));
-                let rpm = reading(report.screw_rpm.map(Rpm::get));
-                let mpa = reading(report.pressure_mpa.map(MPa::get));
-                let flow = reading(report.flow_mm3_per_s.map(Mm3PerS::get));
-                let filled = reading(report.filled_mm.map(Mm::get));
-                format!("STATE {t_ms} {seq} {pump} {valve} {rpm} {mpa} {flow} {filled}\n")
-            }
-            Self::Err { seq, code, text } => format_err(*seq, *code, text),
-        }
+    fn write(&self) -> String {
+        let (unit, name) = (self.drive.unit_word(), one_word(&self.name, "extruder"));
+        let (min, max) = (NUMBERS.write(self.min), NUMBERS.write(self.max));
+        format!("{name} {unit} {min} {max}")
     }
 }
 
-fn parse_hello(mut fields: Fields<'_>) -> Result<ExtruderLine, LineError> {
-    fields.version()?;
-    let name = fields.word("name")?.to_owned();
-    let word = fields.word("unit")?;
-    let expected = "rpm, v, mpa, mm3_per_s, kg_per_s or filling";
-    let drive = Drive::of_unit_word(word).ok_or_else(|| fields.wrong("unit", expected, word))?;
-    let min = fields.number("min")?;
-    let max = fields.number("max")?;
-    if min > max {
-        return Err(LineError::Range { min, max });
+impl LineBody for ExtruderStatus {
+    fn read(fields: &mut Fields<'_>) -> Result<Self, LineError> {
+        let t_ms = fields.whole("t_ms")?;
+        let seq = fields.whole("seq")?;
+        let word = fields.word("pump")?;
+        let expected = "OFF, STARTING, ON, STOPPING or FAULT";
+        let pump = pump_of(word).ok_or_else(|| fields.wrong("pump", expected, word))?;
+        let report = ExtruderReport {
+            pump,
+            valve_open: fields.switch("valve")?,
+            screw_rpm: fields.reading("rpm", Rpm::new)?,
+            pressure_mpa: fields.reading("mpa", MPa::new)?,
+            flow_mm3_per_s: fields.reading("mm3_per_s", Mm3PerS::new)?,
+            filled_mm: fields.reading("filled_mm", Mm::new)?,
+        };
+        Ok(Self { t_ms, seq, report })
     }
-    fields.end(ExtruderLine::Hello(ExtruderHello { name, drive, min, max }))
-}
 
-fn parse_state(mut fields: Fields<'_>) -> Result<ExtruderLine, LineError> {
-    let t_ms = fields.whole("t_ms")?;
-    let seq = fields.whole("seq")?;
-    let word = fields.word("pump")?;
-    let expected = "OFF, STARTING, ON, STOPPING or FAULT";
-    let pump = pump_of(word).ok_or_else(|| fields.wrong("pump", expected, word))?;
-    let report = ExtruderReport {
-        pump,
-        valve_open: fields.switch("valve")?,
-        screw_rpm: fields.reading("rpm", Rpm::new)?,
-        pressure_mpa: fields.reading("mpa", MPa::new)?,
-        flow_mm3_per_s: fields.reading("mm3_per_s", Mm3PerS::new)?,
-        filled_mm: fields.reading("filled_mm", Mm::new)?,
-    };
-    fields.end(ExtruderLine::State(ExtruderStatus { t_ms, seq, report }))
+    fn write(&self) -> String {
+        let Self { t_ms, seq, report } = self;
+        let (pump, valve) = (pump_word(report.pump), switch(report.valve_open));
+        let rpm = reading(report.screw_rpm.map(Rpm::get));
+        let mpa = reading(report.pressure_mpa.map(MPa::get));
+        let flow = reading(report.flow_mm3_per_s.map(Mm3PerS::get));
+        let filled = reading(report.filled_mm.map(Mm::get));
+        format!("{t_ms} {seq} {pump} {valve} {rpm} {mpa} {flow} {filled}")
+    }
 }
 
 /// A reading as it stands on a line; `-` where there is no sensor.
 fn reading(value: Option<f64>) -> String {
-    value.map_or_else(|| "-".to_owned(), decimal)
+    value.map_or_else(|| "-".to_owned(), |value| NUMBERS.write(value))
 }
 
 /// The word of a pump's mode on the link.
@@ -147,8 +109,8 @@ fn pump_of(word: &str) -> Option<PumpMode> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::on_wire;
     use super::*;
+    use crate::link::extruder::on_wire;
     use crate::link::{LineSplitter, MAX_LINE};
 
     #[test]

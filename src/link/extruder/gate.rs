@@ -2,13 +2,12 @@
 //! taken, and for how long. Time is an argument; what turns the pump stands
 //! behind it.
 
-use super::{DriveLine, ExtruderHello, ExtruderLine, ExtruderStatus};
+use super::drive_line::DriveLine;
+use super::extruder_line::{ExtruderHello, ExtruderLine, ExtruderStatus};
 use crate::core::time::Stamp;
 use crate::extruder::{ExtruderCommand, ExtruderReport, PumpMode};
-use crate::link::ErrCode;
-use crate::link::count::{Clock, Count, Refusal};
+use crate::link::frame::{DeviceClock, ErrCode, LineRefusal, Sequence, Validity};
 
-const NS_PER_MS: u64 = 1_000_000;
 /// What stands without a command.
 const REST: ExtruderCommand = ExtruderCommand { pump_on: false, valve_open: false, value: 0.0 };
 
@@ -25,8 +24,8 @@ pub struct Faults {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gate {
     hello: ExtruderHello,
-    clock_start_ms: u64,
-    count: Count,
+    clock: DeviceClock,
+    sequence: Sequence,
     /// The running command and when it is void.
     command: Option<(ExtruderCommand, Stamp)>,
     failed: bool,
@@ -39,8 +38,8 @@ impl Gate {
     pub const fn new(hello: ExtruderHello, clock_start_ms: u64) -> Self {
         Self {
             hello,
-            clock_start_ms,
-            count: Count::new(),
+            clock: DeviceClock { of: "extruder", start_ms: clock_start_ms },
+            sequence: Sequence::new(),
             command: None,
             failed: false,
             faults: Faults { refuse: None, mute: false },
@@ -50,12 +49,12 @@ impl Gate {
     /// A connection, which replaces an older one. The count begins again; the
     /// last command keeps running.
     pub const fn connect(&mut self) {
-        self.count = Count::new();
+        self.sequence = Sequence::new();
     }
 
     /// The connection is gone. The last command runs out.
     pub const fn disconnect(&mut self) {
-        self.count.leave();
+        self.sequence.leave();
     }
 
     /// The pump fails: it stops, and no command makes it run.
@@ -95,10 +94,10 @@ impl Gate {
     /// `HELLO`, and while it is mute.
     pub fn state(&self, now: Stamp, report: ExtruderReport) -> Option<ExtruderLine> {
         let pump = if self.failed { PumpMode::Fault } else { report.pump };
-        let (t_ms, seq) = (self.clock_ms(now), self.count.applied());
+        let (t_ms, seq) = (self.clock.ms(now), self.sequence.applied());
         let report = ExtruderReport { pump, ..report };
         let line = ExtruderLine::State(ExtruderStatus { t_ms, seq, report });
-        (self.count.greeted() && !self.faults.mute).then_some(line)
+        (self.sequence.greeted() && !self.faults.mute).then_some(line)
     }
 
     /// Takes a line of the PC; the answer is `HELLO`, or `ERR` where the line
@@ -106,20 +105,15 @@ impl Gate {
     pub fn take(&mut self, now: Stamp, line: DriveLine) -> Option<ExtruderLine> {
         match line {
             DriveLine::Hello => {
-                self.count.greet();
+                self.sequence.greet();
                 Some(ExtruderLine::Hello(self.hello.clone()))
             }
             DriveLine::Bye => None,
             DriveLine::Drive { seq, command, valid_ms, ref_t_ms } => {
-                let taken = self.drive(now, seq, command, (valid_ms, ref_t_ms));
-                taken.err().map(|(code, text)| ExtruderLine::Err { seq, code, text })
+                let taken = self.drive(now, seq, command, Validity { valid_ms, ref_t_ms });
+                taken.err().map(|refusal| ExtruderLine::refused(seq, refusal))
             }
         }
-    }
-
-    /// The answer to bytes that make no line.
-    pub fn bad_line(why: &str) -> ExtruderLine {
-        ExtruderLine::Err { seq: 0, code: ErrCode::Form, text: why.to_owned() }
     }
 
     fn drive(
@@ -127,36 +121,25 @@ impl Gate {
         now: Stamp,
         seq: u64,
         command: ExtruderCommand,
-        (valid_ms, ref_t_ms): (u64, u64),
-    ) -> Result<(), Refusal> {
-        self.count.check(seq)?;
+        validity: Validity,
+    ) -> Result<(), LineRefusal> {
+        self.sequence.check(seq)?;
         if let Some(code) = self.faults.refuse {
-            return Err((code, "refused on purpose".to_owned()));
+            return Err(LineRefusal::on_purpose(code));
         }
         if self.failed && command.pump_on {
-            return Err((ErrCode::Mode, "the pump has failed".to_owned()));
+            return Err(LineRefusal::new(ErrCode::Mode, "the pump has failed"));
         }
         let ExtruderHello { drive, min, max, .. } = &self.hello;
         if command.pump_on && !(*min..=*max).contains(&command.value) {
             let (value, unit) = (command.value, drive.unit());
-            return Err((ErrCode::Range, format!("{value} {unit} is not within {min} to {max}")));
+            let text = format!("{value} {unit} is not within {min} to {max}");
+            return Err(LineRefusal::new(ErrCode::Range, text));
         }
-        let until = self.void_at(now, valid_ms, ref_t_ms)?;
+        let until = self.clock.void_at(now, validity)?;
         self.command = Some((command, until));
-        self.count.apply(seq);
+        self.sequence.apply(seq);
         Ok(())
-    }
-
-    /// When a command is void, if it is not already.
-    fn void_at(&self, now: Stamp, valid_ms: u64, ref_t_ms: u64) -> Result<Stamp, Refusal> {
-        let clock = Clock { of: "extruder", t_ms: self.clock_ms(now) };
-        let void_ms = clock.void_ms(valid_ms, ref_t_ms)?;
-        let since_start_ms = void_ms.saturating_sub(self.clock_start_ms);
-        Ok(Stamp::from_ns(since_start_ms.saturating_mul(NS_PER_MS)))
-    }
-
-    const fn clock_ms(&self, now: Stamp) -> u64 {
-        self.clock_start_ms.saturating_add(now.ns() / NS_PER_MS)
     }
 }
 
@@ -168,7 +151,7 @@ mod tests {
     const RUN: ExtruderCommand = ExtruderCommand { pump_on: true, valve_open: true, value: 60.0 };
 
     fn at(ms: u64) -> Stamp {
-        Stamp::from_ns(ms * NS_PER_MS)
+        Stamp::from_ns(ms * 1_000_000)
     }
 
     fn gate() -> Gate {

@@ -2,7 +2,7 @@
 //! presses out: the plant of Ma et al. 2026 as an extruder.
 
 use super::{Plant, STEP};
-use crate::cell::extruder::PressurePlant;
+use crate::cell::extruder::{GainWave, InputLoad, PressurePlant};
 use crate::core::units::{MPa, Mm3PerS, Rpm};
 use crate::extruder::ExtruderReport;
 use crate::extruder::pressure::Running;
@@ -21,8 +21,8 @@ pub struct Pressed {
 impl Pressed {
     /// At rest.
     pub fn new(plant: &PressurePlant, seed: u64) -> Self {
-        let (share, period_s) = plant.gain_wave;
-        let (rpm, at_s) = plant.load;
+        let GainWave { fraction: share, period_s } = plant.gain_wave;
+        let InputLoad { rpm, at_s } = plant.load;
         let disturbed = Disturbed {
             drift: vec![Drift { share, period_s }],
             load: Some(Load { at_s, rpm }),

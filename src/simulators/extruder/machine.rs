@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::Shared;
+use super::shared::Shared;
 use crate::core::time::Stamp;
 use crate::extruder::PumpMode;
 use crate::link::LineError;
-use crate::link::extruder::{DriveLine, ExtruderLine, Gate, pump_word};
-use crate::simulators::server::{Answer, Machine, Taken};
+use crate::link::extruder::{DriveLine, ExtruderLine, pump_word};
+use crate::simulators::machine::{Answer, Machine, Taken};
 
 pub(super) struct ExtruderMachine {
     shared: Arc<Shared>,
@@ -28,57 +28,48 @@ impl Machine for ExtruderMachine {
     fn tick(&mut self, now: Stamp) -> Option<String> {
         let mut works = self.shared.works();
         works.advance(now);
-        let report = works.plant.report();
-        works.gate.state(now, report).map(|state| state.format())
+        let report = works.plant().report();
+        works.gate().state(now, report).map(|state| state.format())
     }
 
     /// A new connection stands for the operator's key as well.
     fn connected(&mut self, now: Stamp) {
         let mut works = self.shared.works();
         works.advance(now);
-        works.gate.connect();
-        works.gate.acknowledge();
+        works.gate().connect();
+        works.gate().acknowledge();
     }
 
     fn disconnected(&mut self, now: Stamp) {
         let mut works = self.shared.works();
         works.advance(now);
-        works.gate.disconnect();
+        works.gate().disconnect();
     }
 
     fn take(&mut self, now: Stamp, text: &str) -> Result<Taken, LineError> {
         let line = DriveLine::parse(text)?;
         let mut works = self.shared.works();
         works.advance(now);
-        let answer = works.gate.take(now, line).map(answer);
+        let answer = works.gate().take(now, line).map(Answer::from);
         works.advance(now);
         Ok(Taken { answer, bye: line == DriveLine::Bye })
     }
 
     fn bad_line(&mut self, why: &str) -> Answer {
-        answer(Gate::bad_line(why))
+        ExtruderLine::bad_line(why).into()
     }
 
     fn news(&mut self, now: Stamp) -> Option<String> {
         let mut works = self.shared.works();
         works.advance(now);
-        let (pump, valve) = works.plant.state();
-        let pump = if works.gate.has_failed() { PumpMode::Fault } else { pump };
+        let (pump, valve) = works.plant().state();
+        let pump = if works.gate().has_failed() { PumpMode::Fault } else { pump };
         if (pump, valve) == self.told {
             return None;
         }
         self.told = (pump, valve);
         let valve = if valve { "open" } else { "shut" };
         let pump = pump_word(pump);
-        Some(format!("pump {pump}, valve {valve}, told {:.3}", works.told.value))
+        Some(format!("pump {pump}, valve {valve}, told {:.3}", works.command().value))
     }
-}
-
-fn answer(line: ExtruderLine) -> Answer {
-    let text = line.format();
-    let refused = match line {
-        ExtruderLine::Err { seq, code, text } => Some((seq, code, text)),
-        _ => None,
-    };
-    Answer { line: text, refused }
 }

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::Shared;
+use super::shared::Shared;
 use crate::core::robot::RobotMode;
 use crate::core::time::Stamp;
-use crate::link::robot_line::mode_word;
+use crate::link::robot::mode_word;
 use crate::link::{Job, LineError, PcLine, RobotLine};
-use crate::simulators::server::{Answer, Machine, Taken};
+use crate::simulators::machine::{Answer, Machine, Taken};
 
 pub(super) struct RobotMachine {
     shared: Arc<Shared>,
@@ -47,12 +47,12 @@ impl Machine for RobotMachine {
 
     fn take(&mut self, now: Stamp, text: &str) -> Result<Taken, LineError> {
         let line = PcLine::parse(text)?;
-        let answer = self.shared.cell().take(now, line).map(answer);
+        let answer = self.shared.cell().take(now, line).map(Answer::from);
         Ok(Taken { answer, bye: line == PcLine::Bye })
     }
 
     fn bad_line(&mut self, why: &str) -> Answer {
-        answer(self.shared.cell().bad_line(why))
+        RobotLine::bad_line(why).into()
     }
 
     fn news(&mut self, now: Stamp) -> Option<String> {
@@ -65,13 +65,4 @@ impl Machine for RobotMachine {
         let (path, z) = (state.path_mm.get(), state.z_mm.get());
         Some(format!("{from} -> {to} at path {path:.1} mm, z {z:.1} mm"))
     }
-}
-
-fn answer(line: RobotLine) -> Answer {
-    let text = line.format();
-    let refused = match line {
-        RobotLine::Err { seq, code, text } => Some((seq, code, text)),
-        _ => None,
-    };
-    Answer { line: text, refused }
 }

@@ -5,24 +5,12 @@ use std::time::Duration;
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 
+use super::input::Input;
 use super::peer::Peer;
-use super::{Answer, Machine, Notice};
 use crate::core::time::{Span, Stamp};
 use crate::io::clock::RunClock;
 use crate::link::LineFault;
-
-/// What wakes the machine.
-#[derive(Debug)]
-pub(super) enum Input {
-    /// A PC called.
-    Connection(TcpStream),
-    /// Bytes of the connection with this number.
-    Bytes(u64, Vec<u8>),
-    /// The connection with this number is gone.
-    Gone(u64),
-    /// The end.
-    Quit,
-}
+use crate::simulators::machine::{Answer, Machine, Notice, RefusedLine};
 
 pub(super) struct Host<M> {
     machine: M,
@@ -140,9 +128,9 @@ impl<M: Machine> Host<M> {
     }
 
     fn answer(&mut self, answer: &Answer) {
-        if let Some((seq, code, text)) = &answer.refused {
+        if let Some(RefusedLine { seq, why }) = &answer.refused {
             let line = if *seq == 0 { "a line".to_owned() } else { format!("line {seq}") };
-            self.tell(&format!("{line} refused: {code}, {text}"));
+            self.tell(&format!("{line} refused: {}, {}", why.code, why.text));
         }
         self.say(&answer.line);
     }

@@ -7,9 +7,9 @@ use std::time::Duration;
 
 use crossbeam_channel::Sender;
 
-use super::Machine;
-use super::host::Input;
+use super::input::Input;
 use crate::link::{BadLines, LineSplitter};
+use crate::simulators::machine::Machine;
 
 /// A PC that takes no bytes for this long is let go.
 const WRITE: Duration = Duration::from_millis(100);

@@ -1,7 +1,7 @@
 //! What a robot without an operator prints: layer upon layer, while a PC is
 //! connected.
 
-use super::RobotCell;
+use super::virtual_robot::RobotCell;
 use crate::core::robot::RobotMode;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;

@@ -3,10 +3,11 @@
 
 use std::str::Split;
 
-use crate::core::units::{Mm, MmPerS, NotFinite};
+use super::limits::VERSION;
+use crate::core::units::{MmPerS, NotFinite};
 
-/// Largest magnitude that is written; three such numbers still fit a line.
-const LARGEST: f64 = 999_999_999_999.0;
+/// Longest name that still fits a line beside three numbers.
+const LONGEST_NAME: usize = 48;
 /// Decimals that are written: a nanometre, or a nanometre a second.
 const DECIMALS: usize = 6;
 
@@ -77,19 +78,38 @@ pub enum LineError {
 }
 
 /// Reads the fields of one line from left to right.
-pub(super) struct Fields<'a> {
+#[derive(Debug)]
+pub struct Fields<'a> {
     keyword: &'static str,
     rest: Split<'a, char>,
 }
 
 impl<'a> Fields<'a> {
-    /// `rest` are the fields after the keyword.
-    pub(super) fn new(keyword: &'static str, rest: Split<'a, char>) -> Self {
-        Self { keyword, rest }
+    /// Begins a line, which must start with one of `keywords`; `expected` are
+    /// these in words.
+    pub fn open(
+        text: &'a str,
+        keywords: &[&'static str],
+        expected: &'static str,
+    ) -> Result<Self, LineError> {
+        let mut rest = text.split(' ');
+        let found = rest.next().unwrap_or_default();
+        if found.is_empty() {
+            return Err(LineError::Empty);
+        }
+        match keywords.iter().find(|&&keyword| keyword == found) {
+            Some(keyword) => Ok(Self { keyword, rest }),
+            None => Err(LineError::Keyword { found: found.to_owned(), expected }),
+        }
+    }
+
+    /// The word that the line begins with.
+    pub fn keyword(&self) -> &'static str {
+        self.keyword
     }
 
     /// The next field as it stands; an empty one is missing.
-    pub(super) fn word(&mut self, field: &'static str) -> Result<&'a str, LineError> {
+    pub fn word(&mut self, field: &'static str) -> Result<&'a str, LineError> {
         match self.rest.next() {
             Some(word) if !word.is_empty() => Ok(word),
             _ => Err(LineError::Missing { keyword: self.keyword, field }),
@@ -97,7 +117,7 @@ impl<'a> Fields<'a> {
     }
 
     /// The next field as a whole number without sign.
-    pub(super) fn whole(&mut self, field: &'static str) -> Result<u64, LineError> {
+    pub fn whole(&mut self, field: &'static str) -> Result<u64, LineError> {
         let word = self.word(field)?;
         let digits = word.bytes().all(|byte| byte.is_ascii_digit());
         match word.parse() {
@@ -107,7 +127,7 @@ impl<'a> Fields<'a> {
     }
 
     /// The next field as a decimal number: sign, digits and a point only.
-    fn decimal<T>(
+    pub fn quantity<T>(
         &mut self,
         field: &'static str,
         unit: impl Fn(f64) -> Result<T, NotFinite>,
@@ -121,14 +141,14 @@ impl<'a> Fields<'a> {
     }
 
     /// The next field as a number in a unit that the line itself does not tell.
-    pub(super) fn number(&mut self, field: &'static str) -> Result<f64, LineError> {
-        self.decimal(field, |value| {
+    pub fn number(&mut self, field: &'static str) -> Result<f64, LineError> {
+        self.quantity(field, |value| {
             if value.is_finite() { Ok(value) } else { Err(NotFinite { value, unit: "" }) }
         })
     }
 
     /// The next field as a reading, which is `-` where there is no sensor.
-    pub(super) fn reading<T>(
+    pub fn reading<T>(
         &mut self,
         field: &'static str,
         unit: impl Fn(f64) -> Result<T, NotFinite>,
@@ -137,11 +157,11 @@ impl<'a> Fields<'a> {
             self.rest.next();
             return Ok(None);
         }
-        self.decimal(field, unit).map(Some)
+        self.quantity(field, unit).map(Some)
     }
 
     /// The next field as a switch.
-    pub(super) fn switch(&mut self, field: &'static str) -> Result<bool, LineError> {
+    pub fn switch(&mut self, field: &'static str) -> Result<bool, LineError> {
         match self.word(field)? {
             "0" => Ok(false),
             "1" => Ok(true),
@@ -149,31 +169,21 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// The next field as a speed.
-    pub(super) fn speed(&mut self, field: &'static str) -> Result<MmPerS, LineError> {
-        self.decimal(field, MmPerS::new)
-    }
-
-    /// The next field as a length.
-    pub(super) fn length(&mut self, field: &'static str) -> Result<Mm, LineError> {
-        self.decimal(field, Mm::new)
-    }
-
     /// The version of the other side, which must be ours.
-    pub(super) fn version(&mut self) -> Result<(), LineError> {
+    pub fn version(&mut self) -> Result<(), LineError> {
         match self.whole("version")? {
-            super::VERSION => Ok(()),
+            VERSION => Ok(()),
             found => Err(LineError::Version { found }),
         }
     }
 
     /// Everything that is left, as it stands.
-    pub(super) fn text(&mut self) -> String {
+    pub fn text(&mut self) -> String {
         self.rest.by_ref().collect::<Vec<_>>().join(" ")
     }
 
     /// Makes sure that nothing is left, and gives `line`.
-    pub(super) fn end<T>(mut self, line: T) -> Result<T, LineError> {
+    pub fn end<T>(mut self, line: T) -> Result<T, LineError> {
         match self.rest.next() {
             None => Ok(line),
             Some(found) => {
@@ -183,57 +193,41 @@ impl<'a> Fields<'a> {
     }
 
     /// A field that is not of its form.
-    pub(super) fn wrong(
-        &self,
-        field: &'static str,
-        expected: &'static str,
-        found: &str,
-    ) -> LineError {
+    pub fn wrong(&self, field: &'static str, expected: &'static str, found: &str) -> LineError {
         LineError::Field { keyword: self.keyword, field, expected, found: found.to_owned() }
     }
 }
 
-/// The speed as it arrives at the other side: six decimals, at most twelve
-/// digits before the point.
-pub fn on_wire(speed: MmPerS) -> MmPerS {
-    decimal(speed.get()).parse().ok().and_then(|value| MmPerS::new(value).ok()).unwrap_or(speed)
+/// How numbers are written: as many decimals as they need, at most six, without
+/// exponent, and cut to a magnitude with which a line is long enough.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Decimals {
+    /// Largest magnitude that is written.
+    pub largest: f64,
 }
 
-/// A number with as many decimals as it needs, at most six, without exponent.
-pub(super) fn decimal(value: f64) -> String {
-    decimal_within(value, LARGEST)
-}
+impl Decimals {
+    /// A number as it stands on a line.
+    pub fn write(self, value: f64) -> String {
+        let text = format!("{:.DECIMALS$}", value.clamp(-self.largest, self.largest));
+        let text = text.trim_end_matches('0').trim_end_matches('.');
+        if text == "-0" { "0".to_owned() } else { text.to_owned() }
+    }
 
-/// The same, for a number that is cut to a smaller magnitude.
-pub(super) fn decimal_within(value: f64, largest: f64) -> String {
-    let text = format!("{:.DECIMALS$}", value.clamp(-largest, largest));
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+    /// The number as it arrives at the other side.
+    pub fn on_wire(self, value: f64) -> f64 {
+        self.write(value).parse().unwrap_or(value)
+    }
 }
 
 /// Text as it may stand on a line: printing ASCII, at most `longest` bytes.
-pub(super) fn printing(text: &str, longest: usize) -> String {
+pub fn printing(text: &str, longest: usize) -> String {
     let plain = |c: char| if c == ' ' || c.is_ascii_graphic() { c } else { '?' };
     text.chars().take(longest).map(plain).collect()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_number_is_written_as_a_plc_can_read_it() {
-        assert_eq!(decimal(112.5), "112.5");
-        assert_eq!(decimal(150.0), "150");
-        assert_eq!(decimal(1e-9), "0");
-        assert_eq!(decimal(-1e-9), "0");
-        assert_eq!(decimal(f64::MAX), "999999999999");
-        assert_eq!(decimal(0.1 + 0.2), "0.3");
-    }
-
-    #[test]
-    fn what_arrives_is_known_before_it_is_sent() {
-        assert_eq!(on_wire(MmPerS::constant(149.999_999_9)), MmPerS::constant(150.0));
-        assert_eq!(on_wire(MmPerS::constant(81.1)), MmPerS::constant(81.1));
-    }
+/// A name as one word of at most [`LONGEST_NAME`] characters.
+pub fn one_word(name: &str, instead: &str) -> String {
+    let word = printing(name, LONGEST_NAME).replace(' ', "-");
+    if word.is_empty() { instead.to_owned() } else { word }
 }

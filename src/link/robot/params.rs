@@ -1,6 +1,6 @@
 //! What a robot is: its limits, how its speed follows, how long its beads are.
 
-use super::on_wire;
+use super::numbers::on_wire;
 use crate::core::robot::RobotLimits;
 use crate::core::units::{Mm, MmPerS, MmPerS2};
 

@@ -2,20 +2,21 @@
 //! looks at what it says: that the connection was greeted, that no line was
 //! lost, and that the line is not void.
 
-use super::{ErrCode, MAX_VALID_MS, MIN_VALID_MS};
+use super::limits::{MAX_VALID_MS, MIN_VALID_MS};
+use super::refusal::{ErrCode, LineRefusal};
+use crate::core::time::Stamp;
 
-/// Why a line is refused: the code and a text for the operator.
-pub type Refusal = (ErrCode, String);
+const NS_PER_MS: u64 = 1_000_000;
 
 /// The lines of a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Count {
+pub struct Sequence {
     greeted: bool,
     expected: u64,
     applied: u64,
 }
 
-impl Count {
+impl Sequence {
     /// Of a connection that nothing has come over.
     pub const fn new() -> Self {
         Self { greeted: false, expected: 1, applied: 0 }
@@ -48,46 +49,65 @@ impl Count {
 
     /// Takes a line's number. After a gap the count goes on from what came, so
     /// that one lost line costs one refusal and not the connection.
-    pub fn check(&mut self, seq: u64) -> Result<(), Refusal> {
+    pub fn check(&mut self, seq: u64) -> Result<(), LineRefusal> {
         if !self.greeted {
-            return Err((ErrCode::Form, "HELLO must come first".to_owned()));
+            return Err(LineRefusal::new(ErrCode::Form, "HELLO must come first"));
         }
         let expected = self.expected;
         self.expected = expected.max(seq.saturating_add(1));
         if seq == expected {
             return Ok(());
         }
-        Err((ErrCode::Sequence, format!("expected {expected}")))
+        Err(LineRefusal::new(ErrCode::Sequence, format!("expected {expected}")))
     }
 }
 
-/// A controller's clock, and what messages call the controller.
+/// For how long a line holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Clock {
-    /// `robot` or `extruder`.
-    pub of: &'static str,
-    /// What it shows \[ms\].
-    pub t_ms: u64,
+pub struct Validity {
+    /// How long after `ref_t_ms` the line is void \[ms\].
+    pub valid_ms: u64,
+    /// `t_ms` of the newest `STATE` that the PC has seen.
+    pub ref_t_ms: u64,
 }
 
-impl Clock {
-    /// When a line is void that holds for `valid_ms` after `ref_t_ms`, if it is
-    /// not already \[ms\].
-    pub fn void_ms(self, valid_ms: u64, ref_t_ms: u64) -> Result<u64, Refusal> {
-        let Self { of, t_ms } = self;
+/// A device's own clock, which has nothing to do with the PC's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DeviceClock {
+    /// What messages call the device: `robot` or `extruder`.
+    pub of: &'static str,
+    /// What it shows at stamp 0 \[ms\].
+    pub start_ms: u64,
+}
+
+impl DeviceClock {
+    /// What it shows \[ms\].
+    pub const fn ms(self, at: Stamp) -> u64 {
+        self.start_ms.saturating_add(at.ns() / NS_PER_MS)
+    }
+
+    /// When a line is void that arrives now, if it is not already.
+    pub fn void_at(self, now: Stamp, validity: Validity) -> Result<Stamp, LineRefusal> {
+        let Self { of, start_ms } = self;
+        let Validity { valid_ms, ref_t_ms } = validity;
+        let t_ms = self.ms(now);
         if !(MIN_VALID_MS..=MAX_VALID_MS).contains(&valid_ms) {
             let text =
                 format!("valid_ms {valid_ms} is not within {MIN_VALID_MS} to {MAX_VALID_MS}");
-            return Err((ErrCode::Range, text));
+            return Err(LineRefusal::new(ErrCode::Range, text));
         }
         if ref_t_ms > t_ms {
             let text = format!("ref_t_ms {ref_t_ms} lies ahead of the {of}'s {t_ms}");
-            return Err((ErrCode::Range, text));
+            return Err(LineRefusal::new(ErrCode::Range, text));
         }
         let void_ms = ref_t_ms.saturating_add(valid_ms);
         if void_ms <= t_ms {
-            return Err((ErrCode::Stale, format!("void since {} ms", t_ms - void_ms)));
+            return Err(LineRefusal::new(
+                ErrCode::Stale,
+                format!("void since {} ms", t_ms - void_ms),
+            ));
         }
-        Ok(void_ms)
+        let since_start_ms = void_ms.saturating_sub(start_ms);
+        Ok(Stamp::from_ns(since_start_ms.saturating_mul(NS_PER_MS)))
     }
 }

@@ -6,7 +6,7 @@ use crate::link::PcLine;
 const CLOCK_MS: u64 = 5_000_000;
 
 fn ms(t: u64) -> Stamp {
-    Stamp::from_ns(t * NS_PER_MS)
+    Stamp::from_ns(t * 1_000_000)
 }
 
 fn mm_per_s(value: f64) -> MmPerS {

@@ -1,10 +1,10 @@
 //! Lines from the PC to the robot.
 
-use super::VERSION;
-use super::fields::{Fields, LineError, decimal};
+use super::numbers::NUMBERS;
 use crate::core::units::MmPerS;
+use crate::link::frame::{BYE_LINE, Fields, LineError, hello_line, read_hello};
 
-const KEYWORDS: &str = "HELLO, SPEED, STOP or BYE";
+const KEYWORDS: [&str; 4] = ["HELLO", "SPEED", "STOP", "BYE"];
 
 /// A line from the PC to the robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,43 +34,34 @@ pub enum PcLine {
 impl PcLine {
     /// Reads a line without its LF. The name after `HELLO 1` may be any word.
     pub fn parse(text: &str) -> Result<Self, LineError> {
-        let mut words = text.split(' ');
-        match words.next().unwrap_or_default() {
-            "" => Err(LineError::Empty),
-            "HELLO" => {
-                let mut fields = Fields::new("HELLO", words);
-                fields.version()?;
-                fields.word("name")?;
-                fields.end(Self::Hello)
-            }
+        let mut fields = Fields::open(text, &KEYWORDS, "HELLO, SPEED, STOP or BYE")?;
+        match fields.keyword() {
+            "HELLO" => read_hello(fields, Self::Hello),
             "SPEED" => {
-                let mut fields = Fields::new("SPEED", words);
                 let seq = fields.whole("seq")?;
-                let speed = fields.speed("mm_per_s")?;
+                let speed = fields.quantity("mm_per_s", MmPerS::new)?;
                 let valid_ms = fields.whole("valid_ms")?;
                 let ref_t_ms = fields.whole("ref_t_ms")?;
                 fields.end(Self::Speed { seq, speed, valid_ms, ref_t_ms })
             }
             "STOP" => {
-                let mut fields = Fields::new("STOP", words);
                 let seq = fields.whole("seq")?;
                 fields.end(Self::Stop { seq })
             }
-            "BYE" => Fields::new("BYE", words).end(Self::Bye),
-            found => Err(LineError::Keyword { found: found.to_owned(), expected: KEYWORDS }),
+            _ => fields.end(Self::Bye),
         }
     }
 
-    /// The line with its LF, at most [`super::MAX_LINE`] bytes. Speeds keep six
+    /// The line with its LF, at most [`crate::link::MAX_LINE`] bytes. Speeds keep six
     /// decimals.
     pub fn format(&self) -> String {
         match *self {
-            Self::Hello => format!("HELLO {VERSION} truebead\n"),
+            Self::Hello => hello_line(),
             Self::Speed { seq, speed, valid_ms, ref_t_ms } => {
-                format!("SPEED {seq} {} {valid_ms} {ref_t_ms}\n", decimal(speed.get()))
+                format!("SPEED {seq} {} {valid_ms} {ref_t_ms}\n", NUMBERS.write(speed.get()))
             }
             Self::Stop { seq } => format!("STOP {seq}\n"),
-            Self::Bye => "BYE\n".to_owned(),
+            Self::Bye => BYE_LINE.to_owned(),
         }
     }
 }

@@ -16,18 +16,18 @@
 //! setpoint may be ([`MAX_VALID_MS`]): a PC that is dead, or connected and
 //! mute, then leads to `HOLD` and `STOP` like one that falls silent later.
 
-use super::count::Count;
 use super::motion::{Drive, Motion, seconds};
-use super::{ErrCode, MAX_VALID_MS, ParamError, RobotLine, RobotParams};
+use super::params::{ParamError, RobotParams};
+use super::robot_line::RobotLine;
 use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
+use crate::link::frame::{DeviceClock, ErrCode, MAX_VALID_MS, Sequence};
 
 mod take;
 #[cfg(test)]
 mod tests;
 
-const NS_PER_MS: u64 = 1_000_000;
 /// How long it holds before it stops.
 const HOLD_TO_STOP: Span = Span::from_millis(1000);
 /// How long the start speed is valid without a setpoint.
@@ -69,7 +69,7 @@ pub struct RobotCell {
     motion: Motion,
     bead_end: Option<f64>,
     z: Mm,
-    count: Count,
+    sequence: Sequence,
     faults: Faults,
 }
 
@@ -83,7 +83,7 @@ impl RobotCell {
             motion: Motion::default(),
             bead_end: None,
             z: params.z,
-            count: Count::new(),
+            sequence: Sequence::new(),
             faults: Faults::default(),
             params,
         })
@@ -93,18 +93,18 @@ impl RobotCell {
     /// last setpoint keeps running.
     pub fn connect(&mut self, now: Stamp) {
         self.disconnect(now);
-        self.count = Count::new();
+        self.sequence = Sequence::new();
     }
 
     /// The connection is gone. The last setpoint runs out.
     pub fn disconnect(&mut self, now: Stamp) {
         self.advance(now);
-        self.count.leave();
+        self.sequence.leave();
     }
 
     /// Whether a PC is connected and has said `HELLO`.
     pub fn greeted(&self) -> bool {
-        self.count.greeted()
+        self.sequence.greeted()
     }
 
     /// What it does.
@@ -175,8 +175,8 @@ impl RobotCell {
         self.advance(now);
         let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
         RobotState {
-            t_ms: self.clock_ms(),
-            seq: self.count.applied(),
+            t_ms: self.clock().ms(self.at),
+            seq: self.sequence.applied(),
             mode: self.mode(),
             speed_mm_per_s: MmPerS::new(finite(self.motion.speed)).unwrap_or_default(),
             path_mm: Mm::new(finite(self.motion.path)).unwrap_or_default(),
@@ -225,12 +225,7 @@ impl RobotCell {
         self.deadline().is_some_and(|deadline| deadline <= self.at)
     }
 
-    fn clock_ms(&self) -> u64 {
-        self.params.clock_start_ms.saturating_add(self.at.ns() / NS_PER_MS)
-    }
-
-    fn stamp_of(&self, t_ms: u64) -> Stamp {
-        let since_start_ms = t_ms.saturating_sub(self.params.clock_start_ms);
-        Stamp::from_ns(since_start_ms.saturating_mul(NS_PER_MS))
+    fn clock(&self) -> DeviceClock {
+        DeviceClock { of: "robot", start_ms: self.params.clock_start_ms }
     }
 }

@@ -1,6 +1,6 @@
 //! From bytes, however they were cut, to lines.
 
-use super::{MAX_BAD_LINES, MAX_LINE};
+use super::limits::{MAX_BAD_LINES, MAX_LINE};
 
 /// Bytes that cannot be a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

@@ -3,9 +3,10 @@
 use super::{Doing, RobotCell};
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
-use crate::link::count::{Clock, Refusal};
-use crate::link::robot_line::mode_word;
-use crate::link::{ErrCode, PcLine, RobotLine, RobotParams};
+use crate::link::frame::{ErrCode, LineRefusal, Validity};
+use crate::link::robot::params::RobotParams;
+use crate::link::robot::pc_line::PcLine;
+use crate::link::robot::robot_line::{RobotLine, mode_word};
 
 impl RobotCell {
     /// Takes a line of the PC; the answer is `HELLO`, or `ERR` where the line
@@ -14,29 +15,24 @@ impl RobotCell {
         self.advance(now);
         let (seq, taken) = match line {
             PcLine::Hello => {
-                self.count.greet();
+                self.sequence.greet();
                 return Some(RobotLine::Hello(self.limits()));
             }
             PcLine::Bye => return None,
             PcLine::Stop { seq } => (seq, self.take_stop(seq)),
             PcLine::Speed { seq, speed, valid_ms, ref_t_ms } => {
-                (seq, self.take_speed(seq, speed, valid_ms, ref_t_ms))
+                (seq, self.take_speed(seq, speed, Validity { valid_ms, ref_t_ms }))
             }
         };
-        taken.err().map(|(code, text)| RobotLine::Err { seq, code, text })
-    }
-
-    /// The answer to bytes that make no line.
-    pub fn bad_line(&self, why: &str) -> RobotLine {
-        RobotLine::Err { seq: 0, code: ErrCode::Form, text: why.to_owned() }
+        taken.err().map(|refusal| RobotLine::refused(seq, refusal))
     }
 
     /// A stop is obeyed even where the count is broken; the PC hears of that
     /// all the same.
-    fn take_stop(&mut self, seq: u64) -> Result<(), Refusal> {
-        let counted = self.count.check(seq);
+    fn take_stop(&mut self, seq: u64) -> Result<(), LineRefusal> {
+        let counted = self.sequence.check(seq);
         if counted.is_ok() {
-            self.count.apply(seq);
+            self.sequence.apply(seq);
         }
         // Out of motion there is nothing to stop, and STOP is left by hand only.
         if matches!(self.doing, Doing::Print { .. } | Doing::Hold { .. }) {
@@ -49,25 +45,24 @@ impl RobotCell {
         &mut self,
         seq: u64,
         speed: MmPerS,
-        valid_ms: u64,
-        ref_t_ms: u64,
-    ) -> Result<(), Refusal> {
-        self.count.check(seq)?;
+        validity: Validity,
+    ) -> Result<(), LineRefusal> {
+        self.sequence.check(seq)?;
         if let Some(code) = self.faults.refuse {
-            return Err((code, "refused on purpose".to_owned()));
+            return Err(LineRefusal::on_purpose(code));
         }
         if !matches!(self.doing, Doing::Print { .. } | Doing::Hold { .. }) {
             let mode = mode_word(self.mode());
-            return Err((ErrCode::Mode, format!("no setpoint is taken in {mode}")));
+            return Err(LineRefusal::new(ErrCode::Mode, format!("no setpoint is taken in {mode}")));
         }
         let RobotParams { min, max, .. } = self.params;
         if speed < min || speed > max {
-            return Err((ErrCode::Range, format!("{speed} is not within {min} to {max}")));
+            let text = format!("{speed} is not within {min} to {max}");
+            return Err(LineRefusal::new(ErrCode::Range, text));
         }
-        let clock = Clock { of: "robot", t_ms: self.clock_ms() };
-        let until = self.stamp_of(clock.void_ms(valid_ms, ref_t_ms)?);
+        let until = self.clock().void_at(self.at, validity)?;
         self.doing = Doing::Print { target: speed, until };
-        self.count.apply(seq);
+        self.sequence.apply(seq);
         Ok(())
     }
 }

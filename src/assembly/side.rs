@@ -1,0 +1,34 @@
+//! The extruder side of a cell, for a live run and for a simulated one.
+
+use super::extruder::of_strategy;
+use crate::extruder::ExtruderSetup;
+use crate::io::record::ExtruderFile;
+use crate::sim::cell::Rig;
+
+/// The extruder side of a cell that is commanded.
+#[derive(Debug, Clone)]
+pub struct ExtruderSide {
+    /// What the controller knows.
+    pub setup: ExtruderSetup,
+    /// The files that it is made from.
+    pub files: Vec<ExtruderFile>,
+    /// What in them, or about them, an operator should know; nothing that keeps the
+    /// cell from running.
+    pub warnings: Vec<String>,
+}
+
+/// The extruder side of a simulated cell.
+#[derive(Debug)]
+pub struct SimulatedSide {
+    /// What the simulation needs.
+    pub rig: Rig,
+    /// As those of [`ExtruderSide`].
+    pub warnings: Vec<String>,
+}
+
+impl ExtruderSide {
+    /// The file that its strategy is made from, where there is one.
+    pub fn file(&self) -> Option<&ExtruderFile> {
+        of_strategy(&self.files)
+    }
+}

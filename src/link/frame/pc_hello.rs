@@ -1,0 +1,19 @@
+//! How a PC greets a device and takes its leave, over either link.
+
+use super::fields::{Fields, LineError};
+use super::limits::VERSION;
+
+/// The last line of a connection that is ended in order.
+pub const BYE_LINE: &str = "BYE\n";
+
+/// The first line on every connection.
+pub fn hello_line() -> String {
+    format!("HELLO {VERSION} truebead\n")
+}
+
+/// Reads the fields of that line and gives `line`; the name in it may be any word.
+pub fn read_hello<T>(mut fields: Fields<'_>, line: T) -> Result<T, LineError> {
+    fields.version()?;
+    fields.word("name")?;
+    fields.end(line)
+}

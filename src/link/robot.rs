@@ -1,0 +1,18 @@
+//! The robot's dialect of the line link, and a robot that speaks it.
+//! `robot/PROTOCOL.md` tells the same to the person who programs a robot
+//! controller.
+
+pub mod job;
+pub mod motion;
+mod numbers;
+pub mod params;
+pub mod pc_line;
+pub mod robot_line;
+pub mod virtual_robot;
+
+pub use job::Job;
+pub use numbers::on_wire;
+pub use params::{ParamError, RobotParams};
+pub use pc_line::PcLine;
+pub use robot_line::{RobotLine, mode_word};
+pub use virtual_robot::{Faults, RobotCell};

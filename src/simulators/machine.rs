@@ -1,0 +1,75 @@
+//! What a server serves: a machine that takes lines and says its `STATE`.
+
+use crate::core::time::Stamp;
+use crate::link::LineError;
+use crate::link::frame::{DeviceLine, LineBody, LineRefusal};
+
+/// Is told what happens, in words for the person who watches.
+pub type Notice = Box<dyn FnMut(Stamp, &str) + Send>;
+
+/// What stands behind a server.
+pub trait Machine: Send + 'static {
+    /// Name of its threads.
+    const NAME: &'static str;
+    /// What a PC leaves behind, such as `the last setpoint`.
+    const LEFT: &'static str;
+
+    /// Once every period: goes on, and gives the `STATE` to send, if there is
+    /// somebody to hear it.
+    fn tick(&mut self, now: Stamp) -> Option<String>;
+
+    /// A PC called.
+    fn connected(&mut self, now: Stamp);
+
+    /// The PC is gone.
+    fn disconnected(&mut self, now: Stamp);
+
+    /// Takes a line without LF; fails where it makes no sense.
+    fn take(&mut self, now: Stamp, text: &str) -> Result<Taken, LineError>;
+
+    /// The answer to bytes that make no line.
+    fn bad_line(&mut self, why: &str) -> Answer;
+
+    /// What has changed since it was last asked, in words, if anything.
+    fn news(&mut self, now: Stamp) -> Option<String>;
+}
+
+/// What became of a line.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Taken {
+    /// What to answer.
+    pub answer: Option<Answer>,
+    /// Whether it was the last one.
+    pub bye: bool,
+}
+
+/// A line to the PC.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Answer {
+    /// The line with its LF.
+    pub line: String,
+    /// The line that it refuses, where it does.
+    pub refused: Option<RefusedLine>,
+}
+
+/// A line of the PC that is refused.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RefusedLine {
+    /// Its number; 0 where it had none that could be read.
+    pub seq: u64,
+    /// Why.
+    pub why: LineRefusal,
+}
+
+impl<H: LineBody, S: LineBody> From<DeviceLine<H, S>> for Answer {
+    fn from(answer: DeviceLine<H, S>) -> Self {
+        let line = answer.format();
+        let refused = match answer {
+            DeviceLine::Err { seq, code, text } => {
+                Some(RefusedLine { seq, why: LineRefusal { code, text } })
+            }
+            DeviceLine::Hello(_) | DeviceLine::State(_) => None,
+        };
+        Self { line, refused }
+    }
+}
