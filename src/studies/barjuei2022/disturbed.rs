@@ -5,9 +5,9 @@ use rayon::prelude::*;
 use super::{Contender, scale};
 use crate::cell::file::{Cell, RunPart};
 use crate::core::units::Mm;
+use crate::numeric::average::{mean, median};
 use crate::sim::cell::SimError;
-use crate::sim::score::{mean, median};
-use crate::sim::trial::Trial;
+use crate::trials::layer::Trial;
 
 /// Width of the disturbed layers \[mm\].
 const TARGET_MM: f64 = 42.0;

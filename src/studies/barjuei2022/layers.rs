@@ -4,11 +4,12 @@ use super::disturbed::each;
 use super::{Contender, scale};
 use crate::cell::file::{Cell, RunPart};
 use crate::core::units::Mm;
+use crate::numeric::average::median;
 use crate::scenario::table::Level;
 use crate::sim::cell::SimError;
-use crate::sim::compare::{JUDGED_AFTER_MM, SCATTER_AFTER_MM};
-use crate::sim::score::{Score, median};
-use crate::sim::trial::Trial;
+use crate::trials::compare::{JUDGED_AFTER_MM, SCATTER_AFTER_MM};
+use crate::trials::layer::Trial;
+use crate::trials::score::Score;
 use crate::vision::Method;
 
 /// What a layer came to, as the median over seeds.

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::*;
 use crate::cell::file::{Cell, Purpose, RunPart};
 use crate::core::units::Mm;
-use crate::sim::trial::Trial;
+use crate::trials::layer::Trial;
 use crate::vision::Method;
 
 fn cell() -> (Cell, RunPart) {

@@ -1,6 +1,7 @@
 //! The bead characterisation thesis beside its tables 3 and 4, and the corner that it
 //! leaves for later.
 
+mod around;
 mod corner;
 mod draw;
 mod start_stop;
@@ -16,7 +17,10 @@ use crate::extruder::feedforward::share_left;
 use crate::io::progress::Progress;
 use crate::numeric::lti::{Method, TransferFunction};
 use crate::studies::bcs_thesis as plant;
-use crate::studies::reproduce::{Effort, ReproduceError, Reproduced, Rows, Section, Source};
+use crate::studies::error::ReproduceError;
+use crate::studies::row::Rows;
+use crate::studies::source::Source;
+use crate::studies::study::{Effort, Reproduced, Section};
 
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 8;

@@ -17,7 +17,10 @@ use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
 use crate::report::run::sections::legend;
 use crate::report::run::series::Series;
 use crate::report::run::series::series;
-use crate::studies::reproduce::{ReproduceError, Reproduced, Rows, Section, Source};
+use crate::studies::error::ReproduceError;
+use crate::studies::row::Rows;
+use crate::studies::source::Source;
+use crate::studies::study::{Reproduced, Section};
 
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 4;

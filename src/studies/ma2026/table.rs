@@ -2,14 +2,19 @@
 
 use maud::html;
 
-use super::{Experiment, Factors, Tried, margins};
+use super::experiment::{Experiment, Tried};
+use super::margins::margins;
+use super::plant::Factors;
 use crate::core::units::{Mm, MmPerS};
 use crate::extruder::demand;
 use crate::extruder::rheology::PowerLaw;
 use crate::io::progress::Progress;
 use crate::report::run::palette;
 use crate::report::run::palette::Ink;
-use crate::studies::reproduce::{Effort, ReproduceError, Reproduced, Rows, Section, Source};
+use crate::studies::error::ReproduceError;
+use crate::studies::row::Rows;
+use crate::studies::source::Source;
+use crate::studies::study::{Effort, Reproduced, Section};
 
 mod draw;
 

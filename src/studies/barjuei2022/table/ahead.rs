@@ -4,14 +4,16 @@
 
 use maud::html;
 
-use super::{Experiments, draw};
+use super::draw;
+use super::experiments::Experiments;
 use crate::core::units::Mm;
 use crate::io::progress::Progress;
 use crate::studies::barjuei2022::{
     Contender, Disturbance, LAYERS, LayerResult, Rates, Wrong, lay, settles_unseen, step_settles,
     unrest, wrong,
 };
-use crate::studies::reproduce::{ReproduceError, Section};
+use crate::studies::error::ReproduceError;
+use crate::studies::study::Section;
 
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 5;

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::corner::Around;
+use super::around::Around;
 use crate::report::run::area::{Area, XAxis};
 use crate::report::run::palette;
 use crate::report::run::palette::Ink;
