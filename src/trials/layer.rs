@@ -39,13 +39,14 @@ impl Trial {
         calibration: &Calibration,
         seed: u64,
     ) -> Result<Self, SimError> {
-        Self::lay_told((cell, run), calibration, 1.0, seed)
+        Self::lay_told(cell, run, calibration, 1.0, seed)
     }
 
     /// The same by a controller that is told the camera's distance wrong by a
     /// factor.
     pub fn lay_told(
-        (cell, run): (&Cell, &RunPart),
+        cell: &Cell,
+        run: &RunPart,
         calibration: &Calibration,
         factor: f64,
         seed: u64,

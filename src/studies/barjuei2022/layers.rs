@@ -63,7 +63,8 @@ pub fn lay(cell: &Cell, run: &RunPart, seeds: u64) -> Result<LayerResult, SimErr
 /// began to within 0.5 mm of the target for good \[mm\], as the median over
 /// seeds; infinite where it never gets there.
 pub fn settles_unseen(
-    (cell, run): (&Cell, &RunPart),
+    cell: &Cell,
+    run: &RunPart,
     who: Contender,
     target_mm: f64,
     seeds: u64,

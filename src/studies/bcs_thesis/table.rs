@@ -211,14 +211,15 @@ fn sensing(seeds: u64, rows: &mut Rows) -> Result<Section, ReproduceError> {
     for mm in CAMERAS_MM {
         let seeds = seeds.min(CAMERA_SEEDS);
         let compared = compare(seeds, UNMODELLED_SHARE, Control::Observed(camera(mm)))?;
-        found.push((mm, compared.ratio));
+        found.push(draw::CameraGain { behind_mm: mm, ratio: compared.ratio });
     }
-    let bound: Vec<(f64, f64)> = (0..=100_u32)
+    let bound: Vec<draw::CameraGain> = (0..=100_u32)
         .map(|step| {
             let mm = 0.2 * f64::from(step);
             let left = share_left(camera_age_s(mm), CORRELATION_S);
             // The flow off varies by the unmodelled part as well.
-            (mm, (1.0 + UNMODELLED_SHARE.powi(2)).sqrt() / (UNMODELLED_SHARE * left))
+            let ratio = (1.0 + UNMODELLED_SHARE.powi(2)).sqrt() / (UNMODELLED_SHARE * left);
+            draw::CameraGain { behind_mm: mm, ratio }
         })
         .collect();
     Ok(Section {
