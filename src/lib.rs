@@ -40,6 +40,7 @@ pub mod scenario;
 pub mod sim;
 pub mod simulators;
 pub mod studies;
+pub mod trials;
 pub mod tune;
 pub mod vision;
 pub mod width_control;

@@ -1,5 +1,6 @@
 //! What a numerical library would hold: statistics, filters, linear systems, fits.
 
+pub mod average;
 pub mod blurred_step;
 pub mod hampel;
 pub mod lti;

@@ -11,7 +11,7 @@ use structure::{circles, uses};
 
 /// Every room with the rooms that it may use. A room stands after all that it uses, so
 /// that there is no circle.
-const ROOMS: [(&str, &[&str]); 26] = [
+const ROOMS: [(&str, &[&str]); 27] = [
     ("core", &[]),
     ("numeric", &[]),
     ("document", &[]),
@@ -48,7 +48,6 @@ const ROOMS: [(&str, &[&str]); 26] = [
             "numeric",
             "calibration",
             "vision",
-            "width_control",
             "identify",
             "extruder",
             "scenario",
@@ -57,6 +56,10 @@ const ROOMS: [(&str, &[&str]); 26] = [
             "link",
             "run",
         ],
+    ),
+    (
+        "trials",
+        &["core", "numeric", "calibration", "width_control", "control", "cell", "run", "sim"],
     ),
     ("io", &["core", "document", "calibration", "identify", "extruder", "control", "cell", "run"]),
     (
@@ -128,6 +131,7 @@ const ROOMS: [(&str, &[&str]); 26] = [
             "control",
             "cell",
             "sim",
+            "trials",
             "io",
             "tune",
             "rows",
@@ -150,6 +154,7 @@ const ROOMS: [(&str, &[&str]); 26] = [
             "cell",
             "run",
             "sim",
+            "trials",
             "io",
             "report",
         ],
@@ -171,6 +176,7 @@ const ROOMS: [(&str, &[&str]); 26] = [
             "link",
             "run",
             "sim",
+            "trials",
             "io",
             "assembly",
             "tune",

@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use truebead::identify::file;
+use truebead::sim::flow_log;
 use truebead::sim::hash::{mix, normal_pair};
-use truebead::sim::logged;
 
 use common::{said, truebead};
 
@@ -28,7 +28,7 @@ fn identify(log: &Path, more: &[&str]) -> Command {
 /// A log of the simulated extruder, with its lines changed.
 fn log(folder: &Path, change: impl FnOnce(&mut Vec<String>)) -> PathBuf {
     let mut lines: Vec<String> =
-        logged::binary().unwrap().to_csv().lines().map(str::to_owned).collect();
+        flow_log::binary().unwrap().to_csv().lines().map(str::to_owned).collect();
     change(&mut lines);
     let path = folder.join("log.csv");
     fs::write(&path, lines.join("\n") + "\n").unwrap();
@@ -357,7 +357,7 @@ fn what_a_recording_cannot_be_asked_for() {
 /// A log of a bead that is measured 40 mm behind the nozzle while the speed
 /// changes, from the log of an extruder.
 fn bead_log(folder: &Path) -> PathBuf {
-    let log = logged::binary().unwrap();
+    let log = flow_log::binary().unwrap();
     let speed = |t: f64| 60.0 + 25.0 * (0.9 * t).sin();
     let way = |t: f64| 60.0 * t + 25.0 / 0.9 * (1.0 - (0.9 * t).cos());
     let area = |k: usize| log.flow_mm3_per_s[k] / speed(log.time_s[k]);

@@ -12,7 +12,7 @@ use truebead::cell::Cell;
 use truebead::cell::file::{CalibrationSource, Purpose};
 use truebead::io::calibration_file;
 use truebead::scenario::image::{Motion, Side, Spots};
-use truebead::sim::scenario::Series;
+use truebead::sim::frame_series::Series;
 use truebead::vision::{Measurer, Method, WidthMeasurement};
 
 const FOLDERS: [&str; 3] = ["straight", "tilted", "dark"];

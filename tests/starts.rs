@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use truebead::identify::start_stop::file::{self, START, STOP};
-use truebead::sim::start_stop::{Machine, Recording, example, record, to_csv};
+use truebead::sim::melt::Machine;
+use truebead::sim::melt_log::{Recording, example, record, to_csv};
 
 use common::{said, truebead};
 

@@ -13,7 +13,7 @@ use crate::core::units::Mm;
 use crate::io::progress::Progress;
 use crate::report::compare::Comparison;
 use crate::rows::output;
-use crate::sim::compare::{Contender, Figures};
+use crate::trials::compare::{Contender, Figures};
 
 /// Most controllers: as many as there are colours.
 const MOST: usize = 6;

@@ -16,7 +16,7 @@ use crate::cell::Cell;
 use crate::cell::file::{CalibrationSource, Purpose};
 use crate::core::frame::Frame;
 use crate::io::progress::Progress;
-use crate::sim::scenario::Series;
+use crate::sim::frame_series::Series;
 use crate::sim::truth::Truth;
 
 /// Renders frames of a simulated bead, with the truth of each.

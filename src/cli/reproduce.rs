@@ -11,7 +11,10 @@ use super::Voice;
 use crate::io::progress::Progress;
 use crate::rows::output;
 use crate::studies::reproduce::summary::Summary;
-use crate::studies::reproduce::{Effort, Reproduced, Row, Source, page, table};
+use crate::studies::reproduce::{page, table};
+use crate::studies::row::Row;
+use crate::studies::source::Source;
+use crate::studies::study::{Effort, Reproduced};
 
 /// Runs the experiments of a source paper beside its published numbers.
 #[derive(Debug, Args)]

@@ -56,7 +56,7 @@ fn keeps_its_limits(plan: &Plan, nominal: &SpeedProfile, most_s: f64) {
 
 fn rms(plan: &Plan, from: f64, to: f64) -> f64 {
     let inside = plan.foretold.iter().filter(|(at, _)| (from..=to).contains(at));
-    crate::sim::score::mean(inside.map(|(_, error)| error * error)).sqrt()
+    crate::numeric::average::rms(inside.map(|(_, error)| *error))
 }
 
 #[test]

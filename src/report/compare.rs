@@ -13,7 +13,7 @@ use super::run::sections::legend;
 use super::run::series::Series;
 use super::run::series::series;
 use super::run::whole_page;
-use crate::sim::compare::{Estimate, Figures, JUDGED_AFTER_MM, SCATTER_AFTER_MM};
+use crate::trials::compare::{Estimate, Figures, JUDGED_AFTER_MM, SCATTER_AFTER_MM};
 
 /// One number of one controller at one width, as `compare.json` has it.
 #[derive(Debug, Clone, PartialEq, Serialize)]

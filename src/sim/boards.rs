@@ -103,6 +103,13 @@ struct Scene {
     marks: Option<Marked>,
 }
 
+/// A coordinate on the board and how far it is blurred, both in squares.
+#[derive(Debug, Clone, Copy)]
+struct Blurred {
+    at: f64,
+    blur: f64,
+}
+
 /// The markers in the white squares.
 struct Marked {
     /// Cells along a marker's side, and the side of one in squares.
@@ -130,12 +137,12 @@ impl Marked {
 
     /// How much of a place in a square is covered by its marker's black.
     #[expect(clippy::cast_precision_loss, reason = "a handful of cells")]
-    fn cover(&self, square: usize, (u, v): ((f64, f64), (f64, f64))) -> f64 {
+    fn cover(&self, square: usize, u: Blurred, v: Blurred) -> f64 {
         let Some(black) = self.black.get(square).filter(|black| !black.is_empty()) else {
             return 0.0;
         };
         let (count, side) = self.cells;
-        let along = |(at, blur): (f64, f64)| -> Vec<f64> {
+        let along = |Blurred { at, blur }: Blurred| -> Vec<f64> {
             let passed = |line: usize| step(at - self.clear - line as f64 * side, blur);
             (0..count).map(|cell| passed(cell) - passed(cell + 1)).collect()
         };
@@ -185,7 +192,8 @@ impl Scene {
             let moved = slope.dot(&self.exposure.way_px).powi(2) / 12.0;
             (slope.norm_squared() * still + moved).sqrt().max(1e-9)
         };
-        let (u, v) = ((at.x, blur(0)), (at.y, blur(1)));
+        let u = Blurred { at: at.x, blur: blur(0) };
+        let v = Blurred { at: at.y, blur: blur(1) };
         let white = 0.5 * (WHITE + BLACK);
         let checker = white - 0.5 * (WHITE - BLACK) * wave(u) * wave(v);
         let checker = checker - (WHITE - BLACK) * self.marker(u, v);
@@ -194,7 +202,7 @@ impl Scene {
         }
         // The origin is the first inner corner, one square within the board.
         let inside = |grow: f64| {
-            let along = |(at, blur), squares: f64| {
+            let along = |Blurred { at, blur }, squares: f64| {
                 step(at + 1.0 + grow, blur) * step(squares - 1.0 + grow - at, blur)
             };
             along(u, self.squares.x) * along(v, self.squares.y)
@@ -207,15 +215,16 @@ impl Scene {
     /// How much of a place is covered by a marker's black: that of its own square alone,
     /// for no marker's blur reaches the next one.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the board")]
-    fn marker(&self, u: (f64, f64), v: (f64, f64)) -> f64 {
+    fn marker(&self, u: Blurred, v: Blurred) -> f64 {
         let Some(marks) = &self.marks else { return 0.0 };
-        let (column, row) = (u.0.floor() + 1.0, v.0.floor() + 1.0);
+        let (column, row) = (u.at.floor() + 1.0, v.at.floor() + 1.0);
         let within = |at: f64, count: f64| (0.0..count).contains(&at);
         if !within(column, self.squares.x) || !within(row, self.squares.y) {
             return 0.0;
         }
         let square = row as usize * self.squares.x as usize + column as usize;
-        marks.cover(square, ((u.0 - u.0.floor(), u.1), (v.0 - v.0.floor(), v.1)))
+        let within_square = |c: Blurred| Blurred { at: c.at - c.at.floor(), ..c };
+        marks.cover(square, within_square(u), within_square(v))
     }
 
     fn on_board(&self, ray: Point2<f64>) -> Option<Vector2<f64>> {
@@ -232,7 +241,7 @@ fn step(inside: f64, blur: f64) -> f64 {
 }
 
 /// Stripes of width 1 and values 1 and -1, 1 from 0 to 1, blurred.
-fn wave((at, blur): (f64, f64)) -> f64 {
+fn wave(Blurred { at, blur }: Blurred) -> f64 {
     let line = at.round();
     let sign = if line.rem_euclid(2.0) < 0.5 { 1.0 } else { -1.0 };
     sign * (2.0 * step(at - line, blur) - 1.0)

@@ -24,7 +24,7 @@ use crate::run::runner::{Handled, Runner};
 
 use super::extruder::SimExtruder;
 use super::hash;
-use super::laid::LaidBead;
+use super::laid::{LaidBead, PathSpeed};
 use super::render::RenderError;
 
 pub use camera::Sight;
@@ -88,9 +88,10 @@ pub struct SimCell<K> {
     pulse_phase: f64,
     /// Widths that have not arrived yet, the oldest first.
     under_way: VecDeque<Arrival>,
-    /// Nozzle's path at the start of the layer, and as far as bead is laid.
+    /// Nozzle's path at the start of the layer \[mm\].
     bead_start: f64,
-    laid_to: (f64, f64),
+    /// As far as bead is laid, from there.
+    laid_to: PathSpeed,
     started: bool,
     speed: Option<MmPerS>,
     setpoint: Option<MmPerS>,
@@ -172,7 +173,7 @@ impl<K: Recorder> SimCell<K> {
             pulse_phase: hash::unit(hash::mix(&[simulation.seed, PULSE])),
             under_way: VecDeque::new(),
             bead_start: 0.0,
-            laid_to: (0.0, 0.0),
+            laid_to: PathSpeed { path_mm: 0.0, speed_mm_per_s: 0.0 },
             started: false,
             speed: None,
             setpoint: None,
@@ -208,7 +209,8 @@ impl<K: Recorder> SimCell<K> {
         self.bead = Self::fresh_bead(&self.cell, self.layers);
         self.camera.raise(self.cell.rise(Some(z)));
         self.bead_start = self.runner.robot_mut().begin(self.now, z).path_mm.get();
-        self.laid_to = (0.0, self.run.robot.start_speed.get());
+        let speed_mm_per_s = self.run.robot.start_speed.get();
+        self.laid_to = PathSpeed { path_mm: 0.0, speed_mm_per_s };
         self.started = false;
         let mut clock = Ticker::new(&self.cell, &self.run, self.now, self.layers);
         let began = self.now;
@@ -293,15 +295,16 @@ impl<K: Recorder> SimCell<K> {
         let state = self.runner.robot_mut().state(self.now);
         let path = state.path_mm.get() - self.bead_start;
         let speed = self.speed_of_flow(state.speed_mm_per_s.get());
-        let (from, last) = self.laid_to;
+        let last = self.laid_to;
         let pulse = self.cell.simulation.flow.pulse_at(self.now.secs(), self.pulse_phase);
         self.bead.set_pulse(pulse);
-        if path > from && matches!(state.mode, RobotMode::Print | RobotMode::Hold) {
+        if path > last.path_mm && matches!(state.mode, RobotMode::Print | RobotMode::Hold) {
             // A piece that is not laid is a gap.
             if let Some(speed) = speed {
-                self.bead.lay_ramp((from, path), (last, speed));
+                self.bead.lay_ramp(last, PathSpeed { path_mm: path, speed_mm_per_s: speed });
             }
-            self.laid_to = (path, speed.unwrap_or(last));
+            let speed_mm_per_s = speed.unwrap_or(last.speed_mm_per_s);
+            self.laid_to = PathSpeed { path_mm: path, speed_mm_per_s };
         }
     }
 

@@ -1,6 +1,7 @@
 //! One edge of a bead as a function of the place along the gauge's axis.
 
 use super::outline::Sample;
+use crate::numeric::number::float;
 
 /// An edge, row by row of a vertical bead; all in pixels.
 #[derive(Debug, Clone)]
@@ -29,14 +30,14 @@ impl Contour {
     /// the axis, from `margin` before the picture to `margin` after it; NaN
     /// where it does not.
     pub fn new(samples: &[Sample], side: usize, run: usize, margin: usize) -> Self {
-        let first = -whole(margin);
+        let first = -float(margin);
         let mut cross = vec![f64::NAN; run + 2 * margin];
         for pair in samples.windows(2) {
             let (a, b) = (pair[0].seen[side], pair[1].seen[side]);
             let from = clamp((a.run - first).ceil(), cross.len());
             let past = clamp((b.run - first).floor() + 1.0, cross.len());
             for (number, crossing) in cross.iter_mut().enumerate().take(past).skip(from) {
-                let share = (whole(number) + first - a.run) / (b.run - a.run);
+                let share = (float(number) + first - a.run) / (b.run - a.run);
                 if share.is_finite() {
                     *crossing = a.cross + (b.cross - a.cross) * share;
                 }
@@ -45,7 +46,7 @@ impl Contour {
         let slope: Vec<f64> = (0..cross.len())
             .map(|i| {
                 let (a, b) = (i.saturating_sub(1), (i + 1).min(cross.len() - 1));
-                (cross[b] - cross[a]) / whole(b - a)
+                (cross[b] - cross[a]) / float(b - a)
             })
             .collect();
         let long = slope.iter().map(|slope| f64::hypot(1.0, *slope)).collect();
@@ -59,7 +60,7 @@ impl Contour {
     /// Place across the axis at a place along it; NaN where it is not seen.
     pub fn crossing(&self, at: f64) -> f64 {
         let near = self.index(at);
-        self.cross[near] + self.slope[near] * (at - self.first - whole(near))
+        self.cross[near] + self.slope[near] * (at - self.first - float(near))
     }
 
     /// First and last place across the axis within a distance of the edge.
@@ -81,7 +82,7 @@ impl Contour {
         let near = self.index(at + foot);
         let near = if self.slope[near].is_finite() { near } else { here };
         let (cross, slope) = (self.cross[near], self.slope[near]);
-        let past = at - self.first - whole(near);
+        let past = at - self.first - float(near);
         let long = self.long[near];
         Tangent {
             beyond: (place - cross - slope * past) / long,
@@ -99,10 +100,4 @@ pub fn clamp(place: f64, count: usize) -> usize {
     )]
     let number = place as usize;
     number.min(count)
-}
-
-/// A number of pixels as a length in pixels.
-#[expect(clippy::cast_precision_loss, reason = "pixel numbers stay far below 2^53")]
-pub fn whole(number: usize) -> f64 {
-    number as f64
 }

@@ -1,8 +1,11 @@
 //! Discs that hide what is below them, on a grid of 4 × 4 points a pixel.
 
-use super::contour::{clamp, whole};
+use super::contour::clamp;
 use super::convolve::{convolve, kernel};
+use super::motion::ShutterPosition;
 use super::shade::Shape;
+use super::view::GaugeExtent;
+use crate::numeric::number::float;
 
 /// Points along the side of a pixel.
 const FINE: usize = 4;
@@ -21,7 +24,7 @@ pub struct Disc {
 /// The points that any disc covers; a bit each, line after line of pixels.
 #[derive(Debug, Clone)]
 pub struct Mask {
-    extent: (usize, usize),
+    extent: GaugeExtent,
     bits: Vec<u16>,
 }
 
@@ -49,13 +52,13 @@ pub struct Layer<'a> {
 
 /// Where along a pixel a point lies, from the pixel's centre \[px\].
 fn point(number: usize) -> f64 {
-    (whole(number) + 0.5) / whole(FINE) - 0.5
+    (float(number) + 0.5) / float(FINE) - 0.5
 }
 
 impl Mask {
     /// Without a disc.
-    pub fn new(extent: (usize, usize)) -> Self {
-        Self { extent, bits: vec![0; extent.0 * extent.1] }
+    pub fn new(extent: GaugeExtent) -> Self {
+        Self { extent, bits: vec![0; extent.run * extent.cross] }
     }
 
     /// Covers a disc.
@@ -64,10 +67,10 @@ impl Mask {
         let range = |middle: f64, count: usize| {
             clamp(middle - radius + 0.5, count)..clamp(middle + radius + 1.5, count)
         };
-        for at in range(run, self.extent.0) {
-            for number in range(cross, self.extent.1) {
-                let (dv, du) = (whole(at) - run, whole(number) - cross);
-                let bits = &mut self.bits[at * self.extent.1 + number];
+        for at in range(run, self.extent.run) {
+            for number in range(cross, self.extent.cross) {
+                let (dv, du) = (float(at) - run, float(number) - cross);
+                let bits = &mut self.bits[at * self.extent.cross + number];
                 for i in 0..FINE * FINE {
                     let (v, u) = (dv + point(i / FINE), du + point(i % FINE));
                     *bits |= u16::from(v * v + u * u <= radius * radius) << i;
@@ -87,14 +90,14 @@ impl Mask {
     #[cfg(test)]
     pub fn share(&self) -> f64 {
         let covered: u32 = self.bits.iter().map(|bits| bits.count_ones()).sum();
-        f64::from(covered) / whole(FINE * FINE * self.bits.len())
+        f64::from(covered) / float(FINE * FINE * self.bits.len())
     }
 }
 
 impl Scene<'_> {
     /// Adds what a layer changes, before the blur, averaged over each pixel.
     pub fn paint(&self, layer: &Layer<'_>, change: &mut [f32]) {
-        let cross = self.shape.extent.1;
+        let cross = self.shape.extent.cross;
         for (at, line) in layer.mask.bits.chunks_exact(cross).enumerate() {
             for (number, bits) in line.iter().enumerate().filter(|(_, bits)| **bits != 0) {
                 let [outside, inside] = self.split(*bits, at, number);
@@ -112,7 +115,7 @@ impl Scene<'_> {
     fn split(&self, bits: u16, at: usize, number: usize) -> [f64; 2] {
         let (mut outside, mut inside) = (0_u32, 0_u32);
         let corners = [(-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5)];
-        let holds = |v: f64, u: f64| self.shape.holds(whole(at) + v, whole(number) + u);
+        let holds = |v: f64, u: f64| self.shape.holds(float(at) + v, float(number) + u);
         let held = corners.into_iter().filter(|(v, u)| holds(*v, *u)).count();
         match held {
             0 => outside = bits.count_ones(),
@@ -124,7 +127,7 @@ impl Scene<'_> {
                 }
             }
         }
-        [outside, inside].map(|count| f64::from(count) / whole(FINE * FINE))
+        [outside, inside].map(|count| f64::from(count) / float(FINE * FINE))
     }
 }
 
@@ -134,14 +137,14 @@ pub fn blur(
     mut change: Vec<f32>,
     width: usize,
     blur_px: f64,
-    places: &[(f64, [f64; 2])],
+    positions: &[ShutterPosition],
 ) -> Vec<f32> {
     convolve(&mut change, width, &kernel(blur_px));
-    if let [(_, [0.0, 0.0])] = places {
+    if let [ShutterPosition { shift_px: [0.0, 0.0], .. }] = positions {
         return change;
     }
     let mut mean = vec![0.0; change.len()];
-    for (weight, [run, cross]) in places {
+    for ShutterPosition { weight, shift_px: [run, cross] } in positions {
         let (down, along) = (run.floor(), cross.floor());
         let (v, u) = (run - down, cross - along);
         let corners = [
@@ -182,7 +185,7 @@ mod tests {
 
     #[test]
     fn a_disc_covers_its_area_once() {
-        let mut mask = Mask::new((40, 50));
+        let mut mask = Mask::new(GaugeExtent { run: 40, cross: 50 });
         let disc = Disc { run: 20.3, cross: 24.8, radius: 9.0 };
         mask.cover(disc);
         mask.cover(disc);
@@ -197,9 +200,11 @@ mod tests {
     fn moving_keeps_the_sum_and_shifts_the_middle() {
         let mut values = vec![0.0; 30 * 20];
         values[10 * 30 + 15] = 6.0;
-        let moved = blur(values, 30, 0.0, &[(0.5, [1.25, -2.5]), (0.5, [2.25, -2.5])]);
+        let positions =
+            [[1.25, -2.5], [2.25, -2.5]].map(|shift_px| ShutterPosition { weight: 0.5, shift_px });
+        let moved = blur(values, 30, 0.0, &positions);
         let moment = |of: &dyn Fn(f64, f64) -> f64| {
-            (0..600).map(|i| f64::from(moved[i]) * of(whole(i / 30), whole(i % 30))).sum::<f64>()
+            (0..600).map(|i| f64::from(moved[i]) * of(float(i / 30), float(i % 30))).sum::<f64>()
         };
         assert!((moment(&|_, _| 1.0) - 6.0).abs() < 1e-5);
         // What a pixel sees through the shifted camera lies the other way.

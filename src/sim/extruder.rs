@@ -11,28 +11,14 @@ use crate::run::ports::ExtruderPort;
 mod filled;
 mod linear;
 mod molten;
+mod plant;
 mod pressed;
 
 pub use filled::Filled;
 pub use linear::Linear;
 pub use molten::Molten;
+pub use plant::{Plant, STEP};
 pub use pressed::Pressed;
-
-/// Step of a simulated plant.
-pub const STEP: Span = Span::from_millis(1);
-
-/// What turns commands into flow.
-pub trait Plant: std::fmt::Debug + Send {
-    /// Goes on by [`STEP`] with a command, in the command's unit, or without
-    /// one while the pump stands.
-    fn advance(&mut self, command: Option<f64>);
-
-    /// Flow that it would give through an open nozzle.
-    fn flow(&self) -> Mm3PerS;
-
-    /// Adds what its sensors read to a report.
-    fn sense(&mut self, report: &mut ExtruderReport);
-}
 
 /// Delays of pump and valve.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

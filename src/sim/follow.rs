@@ -1,7 +1,7 @@
 //! Lays a simulated bead behind a robot that reports where it is.
 
 use super::hash;
-use super::laid::LaidBead;
+use super::laid::{LaidBead, PathSpeed};
 use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;
@@ -50,14 +50,11 @@ impl Follower {
 
     /// Takes a report that arrived at a moment. Reports come in order.
     pub fn observe(&mut self, at: Stamp, state: &RobotState) {
-        let path = state.path_mm.get();
         if lays(state.mode) {
             let previous = self.last.map(|(_, last)| last);
             let goes_on = previous.is_some_and(|last| lays(last.mode) && follows(&last, state));
             if goes_on && let Some(last) = previous {
-                let stretch = (last.path_mm.get(), path);
-                let speeds = (last.speed_mm_per_s.get(), state.speed_mm_per_s.get());
-                self.laid.lay_ramp(stretch, speeds);
+                self.laid.lay_ramp(path_speed(&last), path_speed(state));
             } else {
                 self.begin(previous, state);
             }
@@ -110,6 +107,10 @@ impl Follower {
 
 fn lays(mode: RobotMode) -> bool {
     matches!(mode, RobotMode::Print | RobotMode::Hold)
+}
+
+fn path_speed(state: &RobotState) -> PathSpeed {
+    PathSpeed { path_mm: state.path_mm.get(), speed_mm_per_s: state.speed_mm_per_s.get() }
 }
 
 /// Whether a report continues the path of another.

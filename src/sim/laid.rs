@@ -29,6 +29,15 @@ pub struct LaidBead {
     strips: Vec<Strip>,
 }
 
+/// Where the nozzle is and how fast it goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathSpeed {
+    /// Distance along the path \[mm\].
+    pub path_mm: f64,
+    /// Speed there \[mm/s\].
+    pub speed_mm_per_s: f64,
+}
+
 /// A stretch without a gap.
 #[derive(Debug, Clone)]
 struct Strip {
@@ -102,7 +111,9 @@ impl LaidBead {
     }
 
     /// Lays a piece over which the speed goes evenly from one to another.
-    pub fn lay_ramp(&mut self, (from_mm, to_mm): (f64, f64), (first, last): (f64, f64)) {
+    pub fn lay_ramp(&mut self, from: PathSpeed, to: PathSpeed) {
+        let (from_mm, to_mm) = (from.path_mm, to.path_mm);
+        let (first, last) = (from.speed_mm_per_s, to.speed_mm_per_s);
         let pieces = ((to_mm - from_mm) / 1.0).ceil().clamp(1.0, 1e4);
         let mut done = 0.0;
         while done < pieces {
@@ -213,7 +224,8 @@ mod tests {
             let speed = |at: f64| 80.0 + 0.4 * at;
             let mut at = 0.0;
             while at < 100.0 {
-                bead.lay_ramp((at, at + piece_mm), (speed(at), speed(at + piece_mm)));
+                let here = |path_mm| PathSpeed { path_mm, speed_mm_per_s: speed(path_mm) };
+                bead.lay_ramp(here(at), here(at + piece_mm));
                 at += piece_mm;
             }
             for place in [10.3, 47.77, 80.0] {
@@ -322,7 +334,10 @@ mod tests {
     #[test]
     fn a_ramp_of_speed_makes_a_taper() {
         let mut bead = LaidBead::new(BeadModel::fitted_2022(), SMOOTH, STEADY, 1);
-        bead.lay_ramp((0.0, 100.0), (80.0, 120.0));
+        bead.lay_ramp(
+            PathSpeed { path_mm: 0.0, speed_mm_per_s: 80.0 },
+            PathSpeed { path_mm: 100.0, speed_mm_per_s: 120.0 },
+        );
         let expected = BeadModel::fitted_2022().width_at(100.0);
         assert!((bead.width_at(50.0).unwrap() - expected).abs() < 0.1);
         assert!(bead.width_at(1.0) > bead.width_at(99.0));

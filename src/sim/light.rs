@@ -1,6 +1,6 @@
 //! Light that grows evenly across the picture.
 
-use super::contour::whole;
+use crate::numeric::number::float;
 use crate::scenario::image::Picture;
 
 /// Light of every pixel; 1 in the middle of the picture.
@@ -13,10 +13,10 @@ pub struct Light {
 
 impl Light {
     /// For a picture of so many columns and rows.
-    pub fn new(picture: &Picture, size: (usize, usize)) -> Self {
+    pub fn new(picture: &Picture, columns: usize, rows: usize) -> Self {
         let ratio = picture.light_ratio.max(1.0);
         let swing = (ratio - 1.0) / (ratio + 1.0);
-        let spans = [whole(size.0) - 1.0, whole(size.1) - 1.0];
+        let spans = [float(columns) - 1.0, float(rows) - 1.0];
         let growth = match picture.light_deg {
             None => spans.map(|span| swing / span.max(1.0)),
             Some(direction) => {
@@ -34,12 +34,12 @@ impl Light {
     /// At a pixel.
     pub fn at(&self, column: usize, row: usize) -> f64 {
         let (first, growth) = self.row(row);
-        first + growth * whole(column)
+        first + growth * float(column)
     }
 
     /// At the first pixel of a row, and its growth along the row.
     pub fn row(&self, row: usize) -> (f64, f64) {
-        (self.first + self.growth[1] * whole(row), self.growth[0])
+        (self.first + self.growth[1] * float(row), self.growth[0])
     }
 }
 
@@ -49,7 +49,7 @@ mod tests {
 
     fn at(light_deg: Option<f64>, column: f64, row: usize) -> f64 {
         let picture = Picture { light_ratio: 4.0, light_deg, ..Picture::USUAL };
-        let (first, growth) = Light::new(&picture, (101, 51)).row(row);
+        let (first, growth) = Light::new(&picture, 101, 51).row(row);
         first + growth * column
     }
 

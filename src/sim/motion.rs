@@ -1,16 +1,24 @@
-//! Motion while the shutter is open: the mean of the picture over its places.
+//! Motion while the shutter is open: the mean of the picture over its positions.
 
 use crate::scenario::image::Motion;
 
-/// Most places that a mean is taken over.
+/// Most positions that a mean is taken over.
 const MOST: u32 = 64;
 
-/// Where the picture is while the shutter is open: share of the time and shift
-/// along and across the gauge's axis \[px\]. The places are those of
+/// Where the picture is for a part of the time while the shutter is open.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShutterPosition {
+    /// Fraction of the time.
+    pub weight: f64,
+    /// Shift along and across the gauge's axis \[px\].
+    pub shift_px: [f64; 2],
+}
+
+/// Where the picture is while the shutter is open. The positions are those of
 /// Gauss–Legendre quadrature, close enough for a picture with this blur.
-pub fn places(motion: &Motion, blur_px: f64) -> Vec<(f64, [f64; 2])> {
+pub fn positions(motion: &Motion, blur_px: f64) -> Vec<ShutterPosition> {
     if motion.length_px <= 0.0 {
-        return vec![(1.0, [0.0, 0.0])];
+        return vec![ShutterPosition { weight: 1.0, shift_px: [0.0, 0.0] }];
     }
     let (sin, cos) = libm::sincos(motion.direction_deg.to_radians());
     // A pixel is itself a blur.
@@ -19,7 +27,11 @@ pub fn places(motion: &Motion, blur_px: f64) -> Vec<(f64, [f64; 2])> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
     let count = (3.0 + 1.2 * motion.length_px / blur).ceil().min(f64::from(MOST)) as u32;
     let nodes = (1..=count).map(|number| node(number, count));
-    nodes.map(|(at, weight)| (0.5 * weight, [half * at * cos, half * at * sin])).collect()
+    let position = |(at, weight): (f64, f64)| ShutterPosition {
+        weight: 0.5 * weight,
+        shift_px: [half * at * cos, half * at * sin],
+    };
+    nodes.map(position).collect()
 }
 
 /// A root of Legendre's polynomial of a degree, by Newton's method from
@@ -46,15 +58,18 @@ mod tests {
     #[test]
     fn the_mean_over_the_places_is_the_integral() {
         let motion = Motion { length_px: 6.0, direction_deg: 15.0 };
-        let places = places(&motion, 1.5);
+        let positions = positions(&motion, 1.5);
         let mean = |of: &dyn Fn(f64) -> f64| {
-            places.iter().map(|(weight, [run, cross])| weight * of(run.hypot(*cross))).sum::<f64>()
+            let part = |ShutterPosition { weight, shift_px: [run, cross] }: &ShutterPosition| {
+                weight * of(run.hypot(*cross))
+            };
+            positions.iter().map(part).sum::<f64>()
         };
         assert!((mean(&|_| 1.0) - 1.0).abs() < 1e-12);
         // Variance and fourth moment of a line of length 6.
         assert!((mean(&|r| r * r) - 3.0).abs() < 1e-12);
         assert!((mean(&|r| r.powi(4)) - 81.0 / 5.0).abs() < 1e-10);
-        for (_, [run, cross]) in &places {
+        for ShutterPosition { shift_px: [run, cross], .. } in &positions {
             assert!((cross / run - 15_f64.to_radians().tan()).abs() < 1e-9);
         }
     }
@@ -62,6 +77,6 @@ mod tests {
     #[test]
     fn what_stands_still_is_seen_in_its_place() {
         let still = Motion { length_px: 0.0, direction_deg: 30.0 };
-        assert_eq!(places(&still, 1.5), [(1.0, [0.0, 0.0])]);
+        assert_eq!(positions(&still, 1.5), [ShutterPosition { weight: 1.0, shift_px: [0.0, 0.0] }]);
     }
 }

@@ -5,20 +5,20 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::bend::Bend;
-use super::contour::whole as float;
 use super::light::Light;
 use super::outline::{Bead, Outline};
-use super::seen::Seen;
+use super::seen::{Masks, Seen};
 use super::shade::{self, Shape};
 use super::tint::Tint;
 use super::truth::{self, Truth};
-use super::view::View;
+use super::view::{GaugeExtent, View};
 use super::{grains, hash, motion, spots, texture};
 use crate::calibration::Calibration;
 use crate::core::frame::{Frame, Pixels, WrongSize};
 use crate::core::geometry::ImagePoint;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
+use crate::numeric::number::float;
 use crate::scenario::image::Picture;
 use crate::vision::{Axis, Gauge};
 
@@ -131,7 +131,7 @@ impl Renderer {
         bead: &Bead<'_>,
     ) -> Result<Rendered, RenderError> {
         let view = self.view(robot_z)?;
-        let (run, cross) = self.extent();
+        let GaugeExtent { run, cross } = self.extent();
         // Half the picture across more, for edges that run at an angle.
         let margin = float(shade::margin_px(self.picture.blur_px) + cross / 2);
         let margin = margin + self.picture.motion.length_px;
@@ -166,11 +166,11 @@ impl Renderer {
     }
 
     /// Pixels along and across the gauge's axis.
-    fn extent(&self) -> (usize, usize) {
+    fn extent(&self) -> GaugeExtent {
         let (width, height) = self.size;
         match self.gauge.axis {
-            Axis::Vertical => (height, width),
-            Axis::Horizontal => (width, height),
+            Axis::Vertical => GaugeExtent { run: height, cross: width },
+            Axis::Horizontal => GaugeExtent { run: width, cross: height },
         }
     }
 
@@ -178,21 +178,21 @@ impl Renderer {
     fn see(&self, seq: u64, outline: &Outline, view: &View) -> Seen {
         let picture = &self.picture;
         let shape = Shape::new(outline, view, self.extent(), picture.blur_px);
-        let places = motion::places(&picture.motion, picture.blur_px);
-        let mut seen = Seen::of(&shape, Tint::new(picture).as_ref(), &places);
+        let positions = motion::positions(&picture.motion, picture.blur_px);
+        let mut seen = Seen::of(&shape, Tint::new(picture).as_ref(), &positions);
         let spots = spots::spots(&picture.spots, &shape, hash::mix(&[self.seed, seq, SPOTS]));
         let grains = grains::grains(&picture.grains, &shape, hash::mix(&[self.seed, seq, GRAINS]));
         if spots.is_some() || grains.is_some() {
-            let light = Light::new(picture, self.size);
+            let light = Light::new(picture, self.size.0, self.size.1);
             let at = |run: usize, cross: usize| match self.gauge.axis {
                 Axis::Vertical => light.at(cross, run),
                 Axis::Horizontal => light.at(run, cross),
             };
-            seen.cover(&shape, picture, (spots, grains), &at, &places);
+            seen.cover(&shape, picture, Masks { spots, grains }, &at, &positions);
         }
         match self.gauge.axis {
             Axis::Vertical => seen,
-            Axis::Horizontal => seen.turned(self.extent().1),
+            Axis::Horizontal => seen.turned(self.extent().cross),
         }
     }
 
@@ -200,9 +200,9 @@ impl Renderer {
     fn expose(&self, seq: u64, seen: Option<&Seen>) -> Vec<u8> {
         let Picture { bead_grey, ground_grey, noise_grey, .. } = self.picture;
         let step = bead_grey - ground_grey;
-        let light = Light::new(&self.picture, self.size);
+        let light = Light::new(&self.picture, self.size.0, self.size.1);
         let key = hash::mix(&[self.seed, seq, TEXTURE]);
-        let texture = texture::texture(&self.picture.texture, self.size, key);
+        let texture = texture::texture(&self.picture.texture, self.size.0, self.size.1, key);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(hash::mix(&[self.seed, seq]));
         let (width, height) = self.size;
         let mut pixels = Vec::with_capacity(width * height);

@@ -148,7 +148,8 @@ fn crossing(past: impl Fn(f64) -> f64, full: f64) -> f64 {
 /// Runge–Kutta steps of a tenth of that.
 pub fn delay_free(
     screw: &Screw,
-    (plug_m, from_s): (f64, f64),
+    plug_m: f64,
+    from_s: f64,
     step_s: f64,
     law: impl Fn(f64) -> f64,
 ) -> impl Iterator<Item = f64> {
@@ -272,7 +273,7 @@ mod tests {
     fn without_delay_the_plug_goes_where_the_share_holds_it() {
         let screw = screw(B);
         let hold = screw.holding(0.16);
-        let last = delay_free(&screw, (0.1, 0.0), 0.1, |_| hold).nth(900).unwrap();
+        let last = delay_free(&screw, 0.1, 0.0, 0.1, |_| hold).nth(900).unwrap();
         assert!((last - 0.16).abs() < 1e-6);
     }
 }

@@ -2,8 +2,10 @@
 //! the grey that disturbances add.
 
 use super::discs::{self, Layer, Mask, Scene};
+use super::motion::ShutterPosition;
 use super::shade::Shape;
-use super::tint::Tint;
+use super::tint::{Line, Tint};
+use super::view::GaugeExtent;
 use crate::scenario::image::Picture;
 
 /// Pixels line after line across the bead, until they are turned.
@@ -15,26 +17,36 @@ pub struct Seen {
     pub added: Option<Vec<f32>>,
 }
 
+/// What lies on bead and ground; `None` where there is nothing of the kind.
+#[derive(Debug)]
+pub struct Masks {
+    /// Specular spots, on bead alone.
+    pub spots: Option<Mask>,
+    /// Grains, on top of them.
+    pub grains: Option<Mask>,
+}
+
 impl Seen {
     /// The bead and what follows its edges, as the mean over the places where
     /// the picture is while the shutter is open.
-    pub fn of(shape: &Shape, tint: Option<&Tint>, places: &[(f64, [f64; 2])]) -> Self {
-        let (run, cross) = shape.extent;
+    pub fn of(shape: &Shape, tint: Option<&Tint>, positions: &[ShutterPosition]) -> Self {
+        let GaugeExtent { run, cross } = shape.extent;
         let mut shares = vec![0.0; run * cross];
         let mut added = tint.map(|_| vec![0.0; run * cross]);
         let mut line = Vec::with_capacity(cross);
-        for (weight, shift) in places {
+        for ShutterPosition { weight, shift_px } in positions {
             #[expect(clippy::cast_possible_truncation, reason = "a weight")]
             let weight = *weight as f32;
             for at in 0..run {
-                let Some(first) = shape.line(at, *shift, &mut line) else { continue };
+                let Some(first) = shape.line(at, *shift_px, &mut line) else { continue };
                 let start = at * cross + first;
                 for (share, here) in shares[start..].iter_mut().zip(&line) {
                     *share += weight * here;
                 }
                 if let Some((tint, added)) = tint.zip(added.as_mut()) {
                     let greys = &mut added[at * cross..][..cross];
-                    tint.add(shape, (at, *shift), (first, &line), (weight, greys));
+                    let here = Line { at, shift_px: *shift_px, first, shares: &line, weight };
+                    tint.add(shape, &here, greys);
                 }
             }
         }
@@ -47,9 +59,9 @@ impl Seen {
         &mut self,
         shape: &Shape,
         picture: &Picture,
-        (spots, grains): (Option<Mask>, Option<Mask>),
+        Masks { spots, grains }: Masks,
         light: &dyn Fn(usize, usize) -> f64,
-        places: &[(f64, [f64; 2])],
+        positions: &[ShutterPosition],
     ) {
         let count = self.shares.len();
         let tint = self.added.take().unwrap_or_else(|| vec![0.0; count]);
@@ -69,7 +81,7 @@ impl Seen {
             let grey = |_, _| picture.grains.grey;
             scene.paint(&Layer { mask, grey: &grey, bead_only: false }, &mut change);
         }
-        let mut added = discs::blur(change, shape.extent.1, shape.blur_px, places);
+        let mut added = discs::blur(change, shape.extent.cross, shape.blur_px, positions);
         for (added, tint) in added.iter_mut().zip(tint) {
             *added += tint;
         }

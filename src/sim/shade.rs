@@ -1,10 +1,11 @@
 //! How much of each pixel is bead: the outline, blurred by the lens and
 //! integrated over the pixels.
 
-use super::contour::{Contour, clamp, whole};
+use super::contour::{Contour, clamp};
 use super::edge::coverage;
 use super::outline::{Outline, Stretch};
-use super::view::View;
+use super::view::{GaugeExtent, View};
+use crate::numeric::number::float;
 
 /// A Gaussian ends here, in standard deviations: 3·10⁻⁷ of a step is left.
 pub const REACH: f64 = 5.0;
@@ -27,7 +28,7 @@ pub struct Shape {
     /// The left and the right edge.
     pub edges: [Contour; 2],
     /// Pixels along and across the axis.
-    pub extent: (usize, usize),
+    pub extent: GaugeExtent,
     /// Standard deviation of the lens' blur \[px\].
     pub blur_px: f64,
     /// None where the bead goes through the whole picture.
@@ -37,9 +38,9 @@ pub struct Shape {
 impl Shape {
     /// The shape of an outline in a picture with so many pixels along and
     /// across the gauge's axis.
-    pub fn new(outline: &Outline, view: &View, extent: (usize, usize), blur_px: f64) -> Self {
+    pub fn new(outline: &Outline, view: &View, extent: GaugeExtent, blur_px: f64) -> Self {
         let margin = margin_px(blur_px);
-        let edges = [0, 1].map(|side| Contour::new(&outline.samples, side, extent.0, margin));
+        let edges = [0, 1].map(|side| Contour::new(&outline.samples, side, extent.run, margin));
         let mut ends: Vec<(Option<End>, Option<End>)> =
             outline.stretches.iter().map(|stretch| ends_of(stretch, outline, view)).collect();
         if ends.iter().any(|ends| matches!(ends, (None, None))) {
@@ -54,14 +55,14 @@ impl Shape {
     /// axis. Near an edge a pixel sees the tangent at the edge's nearest point.
     pub fn line(&self, at: usize, shift: [f64; 2], line: &mut Vec<f32>) -> Option<usize> {
         let [left, right] = &self.edges;
-        let (at, reach) = (whole(at) + shift[0], REACH * self.blur_px + AROUND_PX);
+        let (at, reach) = (float(at) + shift[0], REACH * self.blur_px + AROUND_PX);
         let (from, solid_from) = left.span(at, reach)?;
         let (solid_to, to) = right.span(at, reach)?;
-        let first = clamp(from - shift[1], self.extent.1);
-        let last = clamp(to - shift[1] + 1.0, self.extent.1);
+        let first = clamp(from - shift[1], self.extent.cross);
+        let last = clamp(to - shift[1] + 1.0, self.extent.cross);
         line.clear();
         for number in first..last {
-            let place = whole(number) + shift[1];
+            let place = float(number) + shift[1];
             let from_left = if place > solid_from { 1.0 } else { self.share(0, at, place) };
             let from_right = if place < solid_to { 1.0 } else { self.share(1, at, place) };
             #[expect(clippy::cast_possible_truncation, reason = "a share of one pixel")]
@@ -69,7 +70,7 @@ impl Shape {
         }
         if !self.ends.is_empty() {
             for (share, number) in line.iter_mut().zip(first..) {
-                *share *= self.laid_share(at, whole(number) + shift[1]);
+                *share *= self.laid_share(at, float(number) + shift[1]);
             }
         }
         (first < last).then_some(first)

@@ -6,9 +6,9 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, Poisson, StandardUniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::contour::whole;
 use super::discs::{Disc, Mask};
 use super::shade::Shape;
+use crate::numeric::number::float;
 use crate::scenario::image::Spots;
 
 /// Discs at random places over the bead. They may cover each other: of the
@@ -20,7 +20,7 @@ pub fn spots(spots: &Spots, shape: &Shape, key: u64) -> Option<Mask> {
     }
     let mut random = Xoshiro256PlusPlus::seed_from_u64(key);
     let (from, to) = across(shape, radius);
-    let run = whole(shape.extent.0) + 2.0 * radius;
+    let run = float(shape.extent.run) + 2.0 * radius;
     let density = -libm::log1p(-spots.share.min(0.99)) / (PI * radius * radius);
     let count = Poisson::new(density * run * (to - from)).ok()?.sample(&mut random);
     let mut mask = Mask::new(shape.extent);
@@ -41,8 +41,8 @@ pub fn spots(spots: &Spots, shape: &Shape, key: u64) -> Option<Mask> {
 /// First and last place across the axis that a spot on the bead can have.
 fn across(shape: &Shape, radius: f64) -> (f64, f64) {
     let crossings =
-        |edge: usize| (0..shape.extent.0).map(move |at| shape.edges[edge].crossing(whole(at)));
+        |edge: usize| (0..shape.extent.run).map(move |at| shape.edges[edge].crossing(float(at)));
     let from = crossings(0).fold(f64::INFINITY, f64::min) - radius;
     let to = crossings(1).fold(f64::NEG_INFINITY, f64::max) + radius;
-    (from.max(-radius), to.min(whole(shape.extent.1) + radius))
+    (from.max(-radius), to.min(float(shape.extent.cross) + radius))
 }

@@ -11,7 +11,7 @@ use crate::scenario::image::Texture;
 /// Grey levels of a pattern over so many columns and rows, `None` where there
 /// is none. White noise, blurred with half the correlation length, has the
 /// autocorrelation exp(−(r/L)²).
-pub fn texture(texture: &Texture, (width, height): (usize, usize), key: u64) -> Option<Vec<f32>> {
+pub fn texture(texture: &Texture, width: usize, height: usize, key: u64) -> Option<Vec<f32>> {
     if texture.size_grey <= 0.0 {
         return None;
     }
@@ -49,7 +49,7 @@ mod tests {
     fn size_and_autocorrelation_are_those_asked_for() {
         let asked = Texture { size_grey: 3.0, length_px: 4.0 };
         let (width, height) = (1000, 600);
-        let pattern = texture(&asked, (width, height), 7).unwrap();
+        let pattern = texture(&asked, width, height, 7).unwrap();
         let product = |x: usize, y: usize| {
             let mut sum = 0.0;
             for row in 0..height - y {
@@ -70,6 +70,6 @@ mod tests {
 
     #[test]
     fn no_texture_is_none() {
-        assert!(texture(&Texture { size_grey: 0.0, length_px: 4.0 }, (8, 8), 1).is_none());
+        assert!(texture(&Texture { size_grey: 0.0, length_px: 4.0 }, 8, 8, 1).is_none());
     }
 }

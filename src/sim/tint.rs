@@ -1,9 +1,10 @@
 //! Grey that follows an edge of the bead: light from one side, a shadow, an
 //! older bead beside it.
 
-use super::contour::{clamp, whole};
+use super::contour::clamp;
 use super::shade::{REACH, Shape};
 use crate::numeric::normal_distribution::{cumulative, first_integral};
+use crate::numeric::number::float;
 use crate::scenario::image::Picture;
 
 /// Places of a profile for each pixel.
@@ -23,6 +24,21 @@ pub struct Tint {
     bead: [Profile; 2],
     /// By the distance outside it.
     ground: [Profile; 2],
+}
+
+/// One line across the bead.
+#[derive(Debug, Clone, Copy)]
+pub struct Line<'a> {
+    /// Its number along the gauge's axis.
+    pub at: usize,
+    /// Shift of the picture along and across the axis \[px\].
+    pub shift_px: [f64; 2],
+    /// First pixel that holds bead.
+    pub first: usize,
+    /// Shares of bead from that pixel on.
+    pub shares: &'a [f32],
+    /// Weight of this line in the mean over the shutter's time.
+    pub weight: f32,
 }
 
 /// A corner of a profile: from a distance on, a step and a change of slope.
@@ -49,16 +65,10 @@ impl Tint {
         tint.bead.iter().chain(&tint.ground).any(|p| !p.grey.is_empty()).then_some(tint)
     }
 
-    /// Adds to the grey of one line across the bead, which has `shares` of
-    /// bead from the pixel `first` on.
-    pub fn add(
-        &self,
-        shape: &Shape,
-        (at, shift): (usize, [f64; 2]),
-        (first, shares): (usize, &[f32]),
-        (weight, greys): (f32, &mut [f32]),
-    ) {
-        let run = whole(at) + shift[0];
+    /// Adds to the grey of one line across the bead.
+    pub fn add(&self, shape: &Shape, line: &Line<'_>, greys: &mut [f32]) {
+        let Line { at, shift_px: shift, first, shares, weight } = *line;
+        let run = float(at) + shift[0];
         let middle = 0.5 * (shape.edges[0].crossing(run) + shape.edges[1].crossing(run)) - shift[1];
         let middle = clamp(middle, greys.len());
         let both = self.bead.iter().all(|profile| !profile.grey.is_empty());
@@ -70,14 +80,14 @@ impl Tint {
                 (middle..greys.len(), 0..middle)
             };
             let outside = |number: usize| {
-                sign * shape.edges[edge].tangent(run, whole(number) + shift[1]).beyond
+                sign * shape.edges[edge].tangent(run, float(number) + shift[1]).beyond
             };
             let (bead, ground) = (&self.bead[edge], &self.ground[edge]);
             if !bead.grey.is_empty() || !ground.grey.is_empty() {
                 for number in own {
                     let distance = outside(number);
                     let grey = bead.at(-distance) + ground.at(distance);
-                    let laid = shape.laid_share(run, whole(number) + shift[1]);
+                    let laid = shape.laid_share(run, float(number) + shift[1]);
                     greys[number] += weight * laid * grey;
                 }
             }
@@ -136,7 +146,7 @@ impl Profile {
         let from_px = first - REACH * blur_px;
         let count = clamp((last + REACH * blur_px - from_px) * PER_PX + 2.0, 1 << 24);
         let grey = (0..count).map(|number| {
-            let at = from_px + whole(number) / PER_PX;
+            let at = from_px + float(number) / PER_PX;
             let of = |knee: &&Knee| {
                 let u = (at - knee.at_px) / blur_px;
                 knee.step_grey * cumulative(u) + knee.grey_per_px * blur_px * first_integral(u)
@@ -155,7 +165,7 @@ impl Profile {
         let number = clamp(place, self.grey.len());
         let Some([a, b]) = self.grey.get(number..number + 2) else { return *last };
         #[expect(clippy::cast_possible_truncation, reason = "within 0 to 1")]
-        let share = (place - whole(number)) as f32;
+        let share = (place - float(number)) as f32;
         a + (b - a) * share
     }
 }

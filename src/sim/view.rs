@@ -102,6 +102,15 @@ impl View {
     }
 }
 
+/// Pixels of the image in the gauge's own directions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GaugeExtent {
+    /// Along the gauge's axis: the rows of a vertical bead.
+    pub run: usize,
+    /// Across it: the columns of a vertical bead.
+    pub cross: usize,
+}
+
 /// A point of the image in the gauge's own directions \[px\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {

@@ -4,72 +4,24 @@ pub mod calibration_table;
 pub mod calibrations;
 pub mod drawn;
 pub mod drawn_table;
+mod figures;
 pub mod roughness_table;
 pub mod sets;
 pub mod studio;
 mod table;
 mod verdict;
 
-use serde::Serialize;
-
 use crate::numeric::statistics::Moments;
+use figures::share;
 use sets::{Limits, Set};
 
+pub use figures::{Miss, Outcome, SetFigures};
 pub use table::{markdown, table};
-pub use verdict::Miss;
 
 /// Error from which a width that was reported is silently wrong \[px\].
 const SILENT_PX: f64 = 0.5;
 /// Ends of the 95 % interval, in standard deviations.
 const INTERVAL: f64 = 1.96;
-
-/// Error and standard deviation of one measured width \[mm\].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outcome {
-    /// Measured less true width.
-    pub error_mm: f64,
-    /// As the measurement believes it.
-    pub sigma_mm: f64,
-}
-
-/// The figures of one set. Without a measured frame most of them are none.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SetFigures {
-    /// The set's name.
-    pub set: &'static str,
-    /// Frames that were rendered.
-    pub frames: usize,
-    /// Mean error \[px\].
-    pub bias_px: Option<f64>,
-    /// Root of the mean square of the error \[px\].
-    pub rmse_px: Option<f64>,
-    /// Smallest standard deviation that is possible where the direction is
-    /// known \[px\].
-    pub bound_px: f64,
-    /// RMSE over that.
-    pub rmse_over_bound: Option<f64>,
-    /// Smallest standard deviation that is possible where the direction is
-    /// found from the same edges \[px\].
-    pub free_bound_px: f64,
-    /// RMSE over that.
-    pub rmse_over_free_bound: Option<f64>,
-    /// Mean error \[mm\].
-    pub bias_mm: Option<f64>,
-    /// Root of the mean square of the error \[mm\].
-    pub rmse_mm: Option<f64>,
-    /// Share of the frames that gave a width.
-    pub measured_share: f64,
-    /// Share of the frames that gave a width more than half a pixel off.
-    pub silent_share: f64,
-    /// Root of the mean square of the error over its standard deviation.
-    pub rms_over_sigma: Option<f64>,
-    /// Share of the widths whose 95 % interval holds the true one.
-    pub within_interval: Option<f64>,
-    /// Whether the set's limits are kept; none where it has none.
-    pub kept: Option<bool>,
-    /// What does not keep its limit.
-    pub missed: Vec<Miss>,
-}
 
 impl SetFigures {
     /// Of a set with a pixel of `mm_per_px`; `None` stands for a frame that was
@@ -114,11 +66,6 @@ impl SetFigures {
             missed: Vec::new(),
         }
     }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "no set has 2^53 frames")]
-fn share(part: usize, of: usize) -> f64 {
-    part as f64 / of.max(1) as f64
 }
 
 #[cfg(test)]

@@ -5,6 +5,8 @@ pub mod bounds;
 pub mod corner;
 pub mod fit_table;
 pub mod on_off;
+pub mod start_stop;
+pub mod table;
 
 use crate::numeric::lti::{ModelError, TransferFunction};
 
@@ -48,8 +50,6 @@ pub fn wheel_inverse() -> Result<TransferFunction, ModelError> {
     wheel()?.inverse_through(&TransferFunction::new(&[1.0], &[0.01, 1.0], 0.0)?)
 }
 
-pub mod start_stop;
-pub mod table;
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]

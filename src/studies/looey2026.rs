@@ -6,6 +6,8 @@
 //! operating point and everything about cases 6 to 10 are chosen here.
 
 mod cases;
+pub mod strand;
+pub mod table;
 
 use crate::core::time::Span;
 use crate::extruder::adaptive::{
@@ -13,7 +15,7 @@ use crate::extruder::adaptive::{
     SubSystemError, Targets,
 };
 use crate::sim::hash::{mix, normal_pair};
-use strand::{Disturbance, Parameters, Strand};
+use strand::{Disturbance, Parameters, Ramp, Strand};
 
 pub use cases::{Case, Convergence, SubSystem, TABLE};
 
@@ -141,8 +143,11 @@ impl Experiment {
             let inputs = Inputs { mass_flow_kg_per_s: feed.command, plate_m_per_s: plate.command };
             // Straight up to just before the next millisecond, where a step
             // may come.
-            let ends = |of: &Disturbance| (of.at(t_s), of.at(t_s + HOLD_S * (1.0 - 1e-9)));
-            plant.step(inputs, ends(&self.feed), ends(&self.plate), HOLD_S);
+            let ramp = |of: &Disturbance| Ramp {
+                first: of.at(t_s),
+                last: of.at(t_s + HOLD_S * (1.0 - 1e-9)),
+            };
+            plant.step(inputs, ramp(&self.feed), ramp(&self.plate), HOLD_S);
             (step, dt) = (step + 1, HOLD);
         }
     }
@@ -208,14 +213,12 @@ pub fn command_noise(method: Method) -> Result<f64, SubSystemError> {
         let (feed, plate) = law.step(&seen, &TARGETS, dt);
         sum += (feed.command - start.mass_flow_kg_per_s).powi(2);
         let inputs = Inputs { mass_flow_kg_per_s: feed.command, plate_m_per_s: plate.command };
-        plant.step(inputs, (0.0, 0.0), (0.0, 0.0), hold.secs());
+        plant.step(inputs, Ramp::default(), Ramp::default(), hold.secs());
         dt = hold;
     }
     Ok((sum / f64::from(SAMPLES)).sqrt() / SIGMA_M_PER_S)
 }
 
-pub mod strand;
-pub mod table;
 #[cfg(test)]
 mod tests {
     use super::*;

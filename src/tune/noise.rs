@@ -5,10 +5,9 @@ use serde::Serialize;
 
 use super::Known;
 use crate::identify::camera_offset::{Seen, Study};
+use crate::numeric::number::float;
 use crate::numeric::rank;
 
-/// Standard deviations of normal numbers in a median of absolute ones.
-const OF_MEDIAN: f64 = 1.4826;
 /// Relative standard deviation of such an estimate times the root of the count, for
 /// differences of neighbours, each of which is in two.
 const OF_COUNT: f64 = 1.5;
@@ -60,7 +59,7 @@ pub fn scatter(study: &Study) -> Scatter {
     let each = apart(study, &study.seen);
     let pieces = apart(study, &study.pieces).value;
     let widths: usize = study.pieces.iter().map(|piece| piece.count).sum();
-    let per_piece = number(widths) / number(study.pieces.len()).max(1.0);
+    let per_piece = float(widths) / float(study.pieces.len()).max(1.0);
     let rough = (pieces.powi(2) - each.value.powi(2) / per_piece.max(1.0)).max(0.0).sqrt();
     // Neighbours that share nothing of a gauge are no more apart than their noise.
     let rough = if pieces > each.value / per_piece.max(1.0).sqrt() * ROUGHER { rough } else { 0.0 };
@@ -73,8 +72,9 @@ fn apart(study: &Study, seen: &[Seen]) -> Known {
     let same = pairs.filter(|(before, after)| before.bead == after.bead);
     let mut sizes: Vec<f64> =
         same.map(|(before, after)| (study.left(after) - study.left(before)).abs()).collect();
-    let count = number(sizes.len()).max(1.0);
-    let value = OF_MEDIAN * rank::median(&mut sizes).unwrap_or(0.0) / std::f64::consts::SQRT_2;
+    let count = float(sizes.len()).max(1.0);
+    let value =
+        rank::SIGMA_PER_MEDIAN * rank::median(&mut sizes).unwrap_or(0.0) / std::f64::consts::SQRT_2;
     Known { value, sigma: value * OF_COUNT / count.sqrt() }
 }
 
@@ -156,9 +156,4 @@ impl Likely {
         let ln = -0.5 * (free * noise.ln() + logs + xx.max(f64::MIN_POSITIVE).ln());
         Self { per_root_m: (1000.0 * ratio * noise).sqrt(), ln }
     }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a count of widths")]
-fn number(count: usize) -> f64 {
-    count as f64
 }

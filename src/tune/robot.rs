@@ -6,7 +6,9 @@ use serde::Serialize;
 use super::{Known, Log};
 use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::{Span, Stamp};
+use crate::core::units::MmPerS;
 use crate::link::robot::motion::{Drive, Motion};
+use crate::numeric::number::float;
 
 /// Dead times and lags that are tried \[s\].
 const MOST_DEAD_S: f64 = 0.8;
@@ -85,6 +87,13 @@ pub enum RobotError {
     },
 }
 
+/// A speed that was sent.
+#[derive(Debug, Clone, Copy)]
+struct Setpoint {
+    at_s: f64,
+    speed: f64,
+}
+
 /// A report that the answer is held against.
 #[derive(Debug, Clone, Copy)]
 struct Report {
@@ -96,18 +105,18 @@ struct Report {
 
 /// Finds dead time and lag by least squares.
 pub fn answer(log: &Log) -> Result<RobotAnswer, RobotError> {
-    let told: Vec<(f64, f64)> =
-        log.setpoints.iter().map(|(at, speed)| (at.secs(), speed.get())).collect();
-    let steps = changes(&told);
+    let setpoint = |(at, speed): &(Stamp, MmPerS)| Setpoint { at_s: at.secs(), speed: speed.get() };
+    let setpoints: Vec<Setpoint> = log.setpoints.iter().map(setpoint).collect();
+    let steps = changes(&setpoints);
     if steps < FEWEST_STEPS {
         return Err(RobotError::TooFewSteps { found: steps });
     }
-    let reports = printing(&log.states, told[0].0);
+    let reports = printing(&log.states, setpoints[0].at_s);
     if reports.len() < FEWEST_REPORTS {
         return Err(RobotError::TooFewReports { found: reports.len() });
     }
-    let count = number(reports.len());
-    let squares = |at: Answer| squares(&told, &reports, at);
+    let count = float(reports.len());
+    let squares = |at: Answer| squares(&setpoints, &reports, at);
     let best = search(&squares);
     let left = squares(best) / count;
     let mean = reports.iter().map(|report| report.speed).sum::<f64>() / count;
@@ -115,7 +124,7 @@ pub fn answer(log: &Log) -> Result<RobotAnswer, RobotError> {
     if left > 0.25 * moved {
         return Err(RobotError::DoesNotFollow { left: left.sqrt(), moved: moved.sqrt() });
     }
-    let [dead, lag] = sigmas(&told, &reports, best, left);
+    let [dead, lag] = sigmas(&setpoints, &reports, best, left);
     Ok(RobotAnswer {
         dead_time_s: Known { value: best[0], sigma: dead },
         lag_s: Known { value: best[1], sigma: lag },
@@ -125,9 +134,9 @@ pub fn answer(log: &Log) -> Result<RobotAnswer, RobotError> {
     })
 }
 
-fn changes(told: &[(f64, f64)]) -> usize {
-    let pairs = told.iter().zip(told.iter().skip(1));
-    pairs.filter(|((_, a), (_, b))| (b - a).abs() > LEAST_STEP * a.abs()).count()
+fn changes(setpoints: &[Setpoint]) -> usize {
+    let pairs = setpoints.iter().zip(setpoints.iter().skip(1));
+    pairs.filter(|(a, b)| (b.speed - a.speed).abs() > LEAST_STEP * a.speed.abs()).count()
 }
 
 /// Reports while the robot goes by setpoints. A bead's run-up, before its speed is
@@ -157,14 +166,14 @@ fn printing(states: &[(Stamp, RobotState)], from_s: f64) -> Vec<Report> {
 type Answer = [f64; 3];
 
 /// What each reported speed differs from the model's.
-fn left(told: &[(f64, f64)], reports: &[Report], answer: Answer) -> Vec<f64> {
+fn left(setpoints: &[Setpoint], reports: &[Report], answer: Answer) -> Vec<f64> {
     let [dead_s, lag_s, ln_slope] = answer;
     let accel = libm::exp(ln_slope);
     let lag_s = lag_s.max(LEAST_LAG_S);
     let mut motion = Motion::default();
     let mut last_s = f64::NEG_INFINITY;
     let mut next = 0;
-    let mut target = told.first().map_or(0.0, |first| first.1);
+    let mut target = setpoints.first().map_or(0.0, |first| first.speed);
     let mut differences = Vec::with_capacity(reports.len());
     for report in reports {
         if report.is_first {
@@ -174,10 +183,9 @@ fn left(told: &[(f64, f64)], reports: &[Report], answer: Answer) -> Vec<f64> {
             motion = motion.after(Drive { target, lag_s, accel }, (at_s - last_s).max(0.0));
             last_s = last_s.max(at_s);
         };
-        while let Some((at_s, value)) = told.get(next).filter(|(at, _)| at + dead_s <= report.at_s)
-        {
-            go(target, at_s + dead_s);
-            target = *value;
+        while let Some(due) = setpoints.get(next).filter(|due| due.at_s + dead_s <= report.at_s) {
+            go(target, due.at_s + dead_s);
+            target = due.speed;
             next += 1;
         }
         go(target, report.at_s);
@@ -186,8 +194,8 @@ fn left(told: &[(f64, f64)], reports: &[Report], answer: Answer) -> Vec<f64> {
     differences
 }
 
-fn squares(told: &[(f64, f64)], reports: &[Report], at: Answer) -> f64 {
-    left(told, reports, at).iter().map(|left| left * left).sum()
+fn squares(setpoints: &[Setpoint], reports: &[Report], at: Answer) -> f64 {
+    left(setpoints, reports, at).iter().map(|left| left * left).sum()
 }
 
 /// The best without a limit of the slope; the best with one where that leaves much less.
@@ -245,13 +253,13 @@ fn narrow(squares: &impl Fn(Answer) -> f64, from: Answer, moves_slope: bool) -> 
 
 /// Standard deviations by the slopes of the model at the best, for what is left as
 /// independent noise.
-fn sigmas(told: &[(f64, f64)], reports: &[Report], best: Answer, variance: f64) -> [f64; 2] {
+fn sigmas(setpoints: &[Setpoint], reports: &[Report], best: Answer, variance: f64) -> [f64; 2] {
     let slope = |which: usize| {
         let mut ends = [best, best];
         ends[0][which] = (best[which] - STEP_OF_SIGMA).max(0.0);
         ends[1][which] = best[which] + STEP_OF_SIGMA;
         let way = ends[1][which] - ends[0][which];
-        let [low, high] = ends.map(|at| left(told, reports, at));
+        let [low, high] = ends.map(|at| left(setpoints, reports, at));
         low.into_iter().zip(high).map(move |(low, high)| (high - low) / way).collect::<Vec<_>>()
     };
     let [dead, lag] = [slope(0), slope(1)];
@@ -259,9 +267,4 @@ fn sigmas(told: &[(f64, f64)], reports: &[Report], best: Answer, variance: f64) 
     let (dd, ll, dl) = (product(&dead, &dead), product(&lag, &lag), product(&dead, &lag));
     let det = (dd * ll - dl * dl).max(f64::MIN_POSITIVE);
     [(variance * ll / det).sqrt(), (variance * dd / det).sqrt()].map(|sigma| sigma.min(MOST_LAG_S))
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a count of reports")]
-fn number(count: usize) -> f64 {
-    count as f64
 }

@@ -6,8 +6,9 @@ use anyhow::{Context, Result};
 
 use crate::cli::WrongArguments;
 use crate::rows::output::{make_folder, write_whole};
-use crate::sim::logged;
-use crate::sim::start_stop::{Machine, example as plan, record, to_csv};
+use crate::sim::flow_log;
+use crate::sim::melt::Machine;
+use crate::sim::melt_log::{example as plan, record, to_csv};
 
 /// What its logs are called.
 const LOGS: [&str; 3] = ["log.csv", "other.csv", "starts.csv"];
@@ -25,13 +26,13 @@ pub fn write(folder: &Path) -> Result<()> {
         return Err(WrongArguments::new(what).into());
     }
     make_folder(folder)?;
-    let log = logged::binary().context("the example")?;
-    let other = logged::gaussian().context("the example")?;
+    let log = flow_log::binary().context("the example")?;
+    let other = flow_log::gaussian().context("the example")?;
     write_whole(folder, LOGS[0], log.to_csv().as_bytes())?;
     write_whole(folder, LOGS[1], other.to_csv().as_bytes())?;
     let recorded = record(Machine::USUAL, STARTS_SEED, &plan());
     write_whole(folder, LOGS[2], to_csv(&recorded).as_bytes())?;
-    let truth = logged::truth().context("the example")?;
+    let truth = flow_log::truth().context("the example")?;
     let [log, other, starts] = LOGS.map(|name| folder.join(name).display().to_string());
     say!("example    {log}: a binary sequence of the screw's speed, and the flow");
     say!("           {other}: random levels, to validate with");

@@ -6,7 +6,8 @@ use super::*;
 use crate::core::quantity::Unit;
 use crate::identify::experiment::Rules;
 use crate::identify::fit::DeadTime;
-use crate::sim::logged::{self, Logged};
+use crate::sim::flow_log;
+use crate::sim::flow_log::Logged;
 
 fn experiment(log: &Logged) -> Experiment {
     let rules = Rules::default();
@@ -31,8 +32,8 @@ fn settings(structure: Structure) -> Settings {
 #[test]
 fn a_known_extruder_is_found_again_and_its_file_is_read_again() {
     let data = logs(
-        experiment(&logged::binary().unwrap()),
-        Some(experiment(&logged::gaussian().unwrap())),
+        experiment(&flow_log::binary().unwrap()),
+        Some(experiment(&flow_log::gaussian().unwrap())),
     );
     let forms = [
         settings(Structure::FirstOrder { zero: false }),
@@ -74,11 +75,11 @@ fn a_known_extruder_is_found_again_and_its_file_is_read_again() {
 
 #[test]
 fn another_machine_is_not_foretold() {
-    let mut other = logged::gaussian().unwrap();
+    let mut other = flow_log::gaussian().unwrap();
     for flow in &mut other.flow_mm3_per_s {
         *flow = 1080.0 - *flow;
     }
-    let data = logs(experiment(&logged::binary().unwrap()), Some(experiment(&other)));
+    let data = logs(experiment(&flow_log::binary().unwrap()), Some(experiment(&other)));
     let refusal = study(data, &[settings(Structure::SecondOrderOscillating { zero: false })]);
     let said = refusal.unwrap_err().to_string();
     assert!(said.contains("does not foretell") && said.contains("same machine"), "{said}");
@@ -86,7 +87,7 @@ fn another_machine_is_not_foretold() {
 
 #[test]
 fn an_output_of_noise_alone_has_no_model() {
-    let mut log = logged::binary().unwrap();
+    let mut log = flow_log::binary().unwrap();
     let still = log.flow_mm3_per_s[..250].to_vec();
     for (flow, noise) in log.flow_mm3_per_s.iter_mut().zip(still.iter().cycle()) {
         *flow = *noise;
@@ -100,7 +101,7 @@ fn an_output_of_noise_alone_has_no_model() {
 #[test]
 fn one_log_alone_is_warned_of() {
     let found = study(
-        logs(experiment(&logged::binary().unwrap()), None),
+        logs(experiment(&flow_log::binary().unwrap()), None),
         &[settings(Structure::SecondOrderOscillating { zero: false })],
     );
     let found = found.unwrap();
@@ -112,7 +113,7 @@ fn one_log_alone_is_warned_of() {
 
 /// The example's log with its flow changed, from time \[s\] and flow.
 fn with(more: impl Fn(f64, f64) -> f64) -> Experiment {
-    let mut log = logged::binary().unwrap();
+    let mut log = flow_log::binary().unwrap();
     for (time_s, flow) in log.time_s.iter().zip(&mut log.flow_mm3_per_s) {
         *flow = more(*time_s, *flow);
     }
@@ -204,7 +205,7 @@ fn a_drift_beside_the_answer_is_told() {
 
 #[test]
 fn an_output_on_a_clock_that_is_behind_is_refused() {
-    let mut log = logged::binary().unwrap();
+    let mut log = flow_log::binary().unwrap();
     log.flow_mm3_per_s.rotate_left(50);
     let forms = [settings(Structure::SecondOrderOscillating { zero: false })];
     let said = study(logs(experiment(&log), None), &forms).unwrap_err().to_string();

@@ -1,7 +1,7 @@
 //! The screw of Diagne et al. 2015 as an extruder: its flow goes by the filled
 //! length. It stands while the pump does, and so does all that is on its way.
 
-use super::{Plant, STEP};
+use super::plant::{Plant, STEP};
 use crate::cell::extruder::ScrewPlant as Settings;
 use crate::core::units::{Mm, Mm3PerS};
 use crate::extruder::ExtruderReport;

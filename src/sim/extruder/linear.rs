@@ -1,7 +1,7 @@
 //! A transfer function from command to flow, with what no model tells: an
 //! unknown input, and a flow that wanders.
 
-use super::{Plant, STEP};
+use super::plant::{Plant, STEP};
 use crate::cell::extruder::LinearPlant;
 use crate::core::units::{Mm3PerS, Rpm};
 use crate::extruder::ExtruderReport;

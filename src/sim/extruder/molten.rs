@@ -1,10 +1,10 @@
 //! Melt that recedes from the nozzle in pauses and drools after stops.
 
-use super::{Plant, STEP};
+use super::plant::{Plant, STEP};
 use crate::cell::extruder::MeltPlant;
 use crate::core::units::Mm3PerS;
 use crate::extruder::ExtruderReport;
-use crate::sim::start_stop::{Machine, Melt};
+use crate::sim::melt::{Machine, Melt};
 
 /// The plant with its memory.
 #[derive(Debug)]

@@ -1,7 +1,7 @@
 //! A pressure at the nozzle that follows the screw, and the flow that it
 //! presses out: the plant of Ma et al. 2026 as an extruder.
 
-use super::{Plant, STEP};
+use super::plant::{Plant, STEP};
 use crate::cell::extruder::{GainWave, InputLoad, PressurePlant};
 use crate::core::units::{MPa, Mm3PerS, Rpm};
 use crate::extruder::ExtruderReport;

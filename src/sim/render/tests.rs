@@ -49,7 +49,7 @@ fn shares(renderer: &Renderer, bead: &Bead<'_>) -> Vec<f32> {
 
 fn seen(renderer: &Renderer, bead: &Bead<'_>) -> Seen {
     let view = renderer.view(None).unwrap();
-    let (run, cross) = renderer.extent();
+    let GaugeExtent { run, cross } = renderer.extent();
     let outline = Outline::trace(&view, bead, float(run), float(cross)).unwrap();
     renderer.see(0, &outline, &view)
 }

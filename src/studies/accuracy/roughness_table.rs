@@ -1,5 +1,7 @@
 //! Figures of roughness over successive frames.
 
+use std::ops::Range;
+
 use serde::Serialize;
 
 use super::share;
@@ -94,8 +96,9 @@ pub struct RoughnessFigures {
 pub fn figures(
     advance_px: usize,
     outcomes: &[BeadOutcome],
-    (from, to): (f64, f64),
+    lengths_px: Range<f64>,
 ) -> Vec<RoughnessFigures> {
+    let Range { start: from, end: to } = lengths_px;
     let every: Vec<&BeadOutcome> = outcomes.iter().collect();
     let mut all = RoughnessFigures::of(advance_px, "all", &every);
     all.missed = all.misses();
@@ -245,7 +248,7 @@ mod tests {
             }),
             widths: vec![OwnMeanError { error_px, sigma_px: 0.3 }; 2],
         };
-        let of = |beads: &[BeadOutcome]| figures(10, beads, (3.0, 40.0))[0].missed.join(";");
+        let of = |beads: &[BeadOutcome]| figures(10, beads, 3.0..40.0)[0].missed.join(";");
         let good = [bead(0.9, 0.5), bead(1.1, -0.5), bead(1.0, 0.5)];
         assert_eq!(of(&good), "");
         let rough = [bead(1.3, 0.5), bead(1.4, -0.5), bead(1.0, 0.5)];

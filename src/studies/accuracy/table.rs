@@ -1,6 +1,6 @@
 //! Figures as tables.
 
-use super::{Miss, SetFigures};
+use super::figures::{Miss, SetFigures};
 
 const COLUMNS: usize = 13;
 const HEADS: [&str; COLUMNS] = [

@@ -1,44 +1,7 @@
 //! Figures held against the limits of their set.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::SetFigures;
+use super::figures::{Miss, SetFigures};
 use super::sets::Limits;
-
-/// A figure that does not keep its limit, as the table shows it: shares are in
-/// percent.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Miss {
-    /// Which figure.
-    pub figure: &'static str,
-    /// What it is; none where nothing was measured.
-    pub value: Option<f64>,
-    /// What it was to be, at least or at most.
-    pub limit: f64,
-}
-
-impl fmt::Display for Miss {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.value {
-            None => write!(f, "{} none", self.figure),
-            Some(value) => {
-                let sign = if value < self.limit { '<' } else { '>' };
-                write!(f, "{} {} {sign} {}", self.figure, short(value), short(self.limit))
-            }
-        }
-    }
-}
-
-/// With four digits that count.
-fn short(value: f64) -> f64 {
-    if value == 0.0 {
-        return value;
-    }
-    let scale = 10_f64.powf(3.0 - value.abs().log10().floor());
-    (value * scale).round() / scale
-}
 
 /// A figure and what it must keep to.
 #[derive(Clone, Copy)]
@@ -117,14 +80,6 @@ mod tests {
             kept: None,
             missed: Vec::new(),
         }
-    }
-
-    #[test]
-    fn numbers_are_short_at_any_size() {
-        assert_eq!(
-            [0.0, 1.118_29, 0.005_034_4, 1393.511].map(short),
-            [0.0, 1.118, 0.005_034, 1394.0]
-        );
     }
 
     #[test]

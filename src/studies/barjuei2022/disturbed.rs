@@ -5,9 +5,9 @@ use rayon::prelude::*;
 use super::{Contender, scale};
 use crate::cell::file::{Cell, RunPart};
 use crate::core::units::Mm;
+use crate::numeric::average::{mean, median};
 use crate::sim::cell::SimError;
-use crate::sim::score::{mean, median};
-use crate::sim::trial::Trial;
+use crate::trials::layer::Trial;
 
 /// Width of the disturbed layers \[mm\].
 const TARGET_MM: f64 = 42.0;
@@ -65,7 +65,8 @@ fn look_near(run: &mut RunPart) {
 /// Root mean square error of the bead over that of one which nobody corrects,
 /// as the mean over seeds.
 pub fn unrest(
-    (cell, run): (&Cell, &RunPart),
+    cell: &Cell,
+    run: &RunPart,
     who: Contender,
     what: Disturbance,
     seeds: u64,
@@ -81,7 +82,8 @@ pub fn unrest(
 /// Way after a step of the flow by 8 % within which the bead is back within
 /// 0.5 mm for good \[mm\], as the median over seeds; infinite where it never is.
 pub fn step_settles(
-    (cell, run): (&Cell, &RunPart),
+    cell: &Cell,
+    run: &RunPart,
     who: Contender,
     seeds: u64,
 ) -> Result<f64, SimError> {
@@ -126,7 +128,8 @@ pub struct Borne {
 
 /// Root mean square error of the bead from 500 mm after control began, over seeds.
 pub fn wrong(
-    (cell, run): (&Cell, &RunPart),
+    cell: &Cell,
+    run: &RunPart,
     who: Contender,
     what: Wrong,
     seeds: u64,
@@ -136,7 +139,7 @@ pub fn wrong(
     cell.simulation.missing_share = what.missing;
     let told = what.offset;
     let mut found = each(seeds, |seed| {
-        let trial = Trial::lay_told((&cell, &run), &scale(), told, seed)?;
+        let trial = Trial::lay_told(&cell, &run, &scale(), told, seed)?;
         Ok(trial.rms_error(trial.begun_mm + 500.0))
     })?;
     let mean_mm = mean(found.iter().copied());

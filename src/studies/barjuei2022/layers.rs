@@ -4,11 +4,12 @@ use super::disturbed::each;
 use super::{Contender, scale};
 use crate::cell::file::{Cell, RunPart};
 use crate::core::units::Mm;
+use crate::numeric::average::median;
 use crate::scenario::table::Level;
 use crate::sim::cell::SimError;
-use crate::sim::compare::{JUDGED_AFTER_MM, SCATTER_AFTER_MM};
-use crate::sim::score::{Score, median};
-use crate::sim::trial::Trial;
+use crate::trials::compare::{JUDGED_AFTER_MM, SCATTER_AFTER_MM};
+use crate::trials::layer::Trial;
+use crate::trials::score::Score;
 use crate::vision::Method;
 
 /// What a layer came to, as the median over seeds.
@@ -62,7 +63,8 @@ pub fn lay(cell: &Cell, run: &RunPart, seeds: u64) -> Result<LayerResult, SimErr
 /// began to within 0.5 mm of the target for good \[mm\], as the median over
 /// seeds; infinite where it never gets there.
 pub fn settles_unseen(
-    (cell, run): (&Cell, &RunPart),
+    cell: &Cell,
+    run: &RunPart,
     who: Contender,
     target_mm: f64,
     seeds: u64,

@@ -10,9 +10,10 @@ use crate::control::step::Step;
 use crate::core::geometry::Pose;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
+use crate::numeric::average::mean;
 use crate::run::runner::NoRecorder;
 use crate::sim::cell::{Sight, SimCell, SimError, Witness};
-use crate::sim::score::{Score, mean};
+use crate::trials::score::Score;
 use crate::width_control::target::Target;
 
 /// Two layers, one upon the other.

@@ -2,6 +2,7 @@
 
 mod ahead;
 mod draw;
+mod experiments;
 
 use std::path::Path;
 
@@ -10,10 +11,14 @@ use crate::cell::Cell;
 use crate::cell::file::{Purpose, RunPart};
 use crate::core::units::Mm;
 use crate::io::progress::Progress;
-use crate::studies::barjuei2022 as experiments;
-use crate::studies::reproduce::{Effort, ReproduceError, Reproduced, Rows, Section, Source};
+use crate::studies::barjuei2022 as paper;
+use crate::studies::error::ReproduceError;
+use crate::studies::row::Rows;
+use crate::studies::source::Source;
+use crate::studies::study::{Effort, Reproduced, Section};
 use crate::vision::Method;
 use crate::width_control::target::Target;
+use experiments::Experiments;
 
 const CELL: &str = include_str!("../../../cells/barjuei2022.toml");
 /// Sideways error of the second of two stacked layers \[mm\].
@@ -24,15 +29,6 @@ pub const EXPERIMENTS: u64 = 11 + ahead::EXPERIMENTS;
 const STOREYS: u32 = 20;
 const SEEDS: u64 = 40;
 const FRAME_SEEDS: u64 = 3;
-
-/// The experiments' cell, how often they are run and what came out.
-struct Experiments {
-    cell: Cell,
-    run: RunPart,
-    seeds: u64,
-    frame_seeds: u64,
-    rows: Rows,
-}
 
 /// Runs the experiments.
 pub fn run(effort: Effort, progress: &mut Progress) -> Result<Reproduced, ReproduceError> {
@@ -90,7 +86,7 @@ impl Experiments {
     fn tables(
         &mut self,
         case: &str,
-        layer: &experiments::Layer,
+        layer: &paper::Layer,
         theirs: &LayerResult,
         ours: Option<&LayerResult>,
     ) {
@@ -110,20 +106,20 @@ impl Experiments {
     /// paper's camera and link.
     fn widths(
         &mut self,
-        layer: &experiments::Layer,
+        layer: &paper::Layer,
     ) -> Result<(LayerResult, LayerResult), ReproduceError> {
         let target = layer.target_mm;
-        let theirs = experiments::lay(&self.cell, &asked(&self.run, target), self.seeds)?;
+        let theirs = paper::lay(&self.cell, &asked(&self.run, target), self.seeds)?;
         let (cell, run) = Contender::by_distance(Rates::PAPER).enter(&self.cell, &self.run, target);
-        let ours = experiments::lay(&cell, &run, self.seeds)?;
+        let ours = paper::lay(&cell, &run, self.seeds)?;
         self.tables(&format!("{target} mm"), layer, &theirs, Some(&ours));
         Ok((theirs, ours))
     }
 
-    fn frames(&mut self, layer: &experiments::Layer) -> Result<(), ReproduceError> {
+    fn frames(&mut self, layer: &paper::Layer) -> Result<(), ReproduceError> {
         let lay = |method| {
-            let cell = experiments::with_frames(&self.cell, method);
-            experiments::lay(&cell, &asked(&self.run, layer.target_mm), self.frame_seeds)
+            let cell = paper::with_frames(&self.cell, method);
+            paper::lay(&cell, &asked(&self.run, layer.target_mm), self.frame_seeds)
         };
         let (theirs, ours) = (lay(Method::EdgeLines)?, lay(Method::Caliper)?);
         let case = format!("{} mm, frames rendered", layer.target_mm);
@@ -135,7 +131,7 @@ impl Experiments {
     }
 
     fn stand_off(&mut self) -> Result<Vec<StandOff>, ReproduceError> {
-        let curve = experiments::stand_off(&self.cell)?;
+        let curve = paper::stand_off(&self.cell)?;
         for point in &curve {
             let case = format!("stand-off {:+} mm", point.nearer_mm);
             let published =
@@ -148,8 +144,8 @@ impl Experiments {
 
     fn stack(&mut self) -> Result<(), ReproduceError> {
         let lay = |method| {
-            let cell = experiments::with_frames(&self.cell, method);
-            experiments::stack(&cell, &self.run, ASIDE_MM)
+            let cell = paper::with_frames(&self.cell, method);
+            paper::stack(&cell, &self.run, ASIDE_MM)
         };
         let (theirs, ours) = (lay(Method::EdgeLines)?, lay(Method::Caliper)?);
         let case = format!("two layers of 38 mm, truly {ASIDE_MM} mm apart");
@@ -158,9 +154,8 @@ impl Experiments {
         for (which, name) in
             ["mean width error, layer 1", "mean width error, layer 2"].into_iter().enumerate()
         {
-            let error = |stack: &experiments::Stack| {
-                Some(stack.widths_mm[which] - stack.true_widths_mm[which])
-            };
+            let error =
+                |stack: &paper::Stack| Some(stack.widths_mm[which] - stack.true_widths_mm[which]);
             self.rows.push(&case, (name, "mm"), [None, error(&theirs), error(&ours)]);
         }
         Ok(())
@@ -168,8 +163,8 @@ impl Experiments {
 
     /// The worst of many layers, measured and laid.
     fn tower(&mut self) -> Result<(), ReproduceError> {
-        let storeys = experiments::tower(&self.cell, &self.run, STOREYS)?;
-        let worst = |of: fn(&experiments::Storey) -> f64| {
+        let storeys = paper::tower(&self.cell, &self.run, STOREYS)?;
+        let worst = |of: fn(&paper::Storey) -> f64| {
             storeys.iter().map(|storey| of(storey).abs()).fold(0.0, f64::max)
         };
         let case = format!("{STOREYS} layers of 20 mm and 42 mm, frames rendered, by distance");

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::*;
 use crate::cell::file::{Cell, Purpose, RunPart};
 use crate::core::units::Mm;
-use crate::sim::trial::Trial;
+use crate::trials::layer::Trial;
 use crate::vision::Method;
 
 fn cell() -> (Cell, RunPart) {
@@ -103,7 +103,7 @@ fn by_distance_it_settles_soon_after_the_first_bead_is_seen() {
     for target in [44.0, 42.0, 40.0, 38.0] {
         for (rates, most) in [(RATES[0], 148.4), (RATES[1], 118.4)] {
             let who = Contender::by_distance(rates);
-            let found = settles_unseen((&cell, &run), who, target, SEEDS).unwrap();
+            let found = settles_unseen(&cell, &run, who, target, SEEDS).unwrap();
             assert!(found <= most, "{target} {rates:?}: {found}");
         }
     }
@@ -131,7 +131,7 @@ fn by_distance_a_step_of_the_flow_is_answered_once_it_is_seen() {
     cell.simulation.width_noise = Mm::ZERO;
     for (rates, most) in [(RATES[0], 140.0), (RATES[1], 75.0)] {
         let who = Contender::by_distance(rates);
-        let found = step_settles((&cell, &run), who, SEEDS).unwrap();
+        let found = step_settles(&cell, &run, who, SEEDS).unwrap();
         assert!(found <= most, "{rates:?}: {found}");
     }
 }
@@ -139,8 +139,7 @@ fn by_distance_a_step_of_the_flow_is_answered_once_it_is_seen() {
 #[test]
 fn by_distance_slow_waves_and_pulsations_are_taken_out() {
     let (cell, run) = cell();
-    let ratio =
-        |rates, what| unrest((&cell, &run), Contender::by_distance(rates), what, 6).unwrap();
+    let ratio = |rates, what| unrest(&cell, &run, Contender::by_distance(rates), what, 6).unwrap();
     for (wavelength, most) in [(2400.0, [0.43, 0.28]), (1200.0, [0.77, 0.55])] {
         for (rates, most) in RATES.into_iter().zip(most) {
             let found = ratio(rates, Disturbance::Wave(wavelength));
@@ -160,7 +159,7 @@ fn by_distance_what_is_told_wrong_and_widths_that_are_wrong_are_borne() {
     let (cell, run) = cell();
     let told = |rates, exponent, what| {
         let who = Contender::Distance(rates, exponent);
-        wrong((&cell, &run), who, what, SEEDS).unwrap()
+        wrong(&cell, &run, who, what, SEEDS).unwrap()
     };
     for rates in RATES {
         let nominal = told(rates, 0.25, Wrong::NOTHING);

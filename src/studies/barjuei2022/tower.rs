@@ -7,9 +7,9 @@ use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
+use crate::numeric::average::mean;
 use crate::run::runner::NoRecorder;
 use crate::sim::cell::{Sight, SimCell, SimError, Witness};
-use crate::sim::score::mean;
 use crate::vision::Method;
 use crate::width_control::target::{Layers, Target};
 

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::fit_table::FitTableError;
 use super::flow;
 use crate::identify::fit::{Before, DeadTime, Level, Samples, Settings, Structure, fit};
+use crate::numeric::average::{rms, standard_deviation};
 use crate::numeric::lti::{FirstOrder, ModelError, TransferFunction, simulate};
 use crate::sim::hash::{mix, normal_pair};
 
@@ -83,7 +84,7 @@ pub fn flow_model(trials: u64) -> Result<[Bound; 5], FitTableError> {
         settings: at_rest(Structure::Transfer { poles: 2, zeros: 2 }, DeadTime::Given(0.0)),
         model: &|p| TransferFunction::new(&[p[2], p[3], p[4]], &[1.0, p[0], p[1]], 0.0),
     };
-    experiment.bounds(0.17 * spread(&clean), trials)
+    experiment.bounds(0.17 * standard_deviation(&clean), trials)
 }
 
 /// From rest, with an output whose level is known.
@@ -104,9 +105,7 @@ impl<const N: usize> Experiment<'_, N> {
             .map(|seed| self.trial(&clean, noise, seed))
             .collect();
         let errors = errors?;
-        let scatter = |i: usize| {
-            crate::sim::score::mean(errors.iter().map(|error| error[i] * error[i])).sqrt()
-        };
+        let scatter = |i: usize| rms(errors.iter().map(|error| error[i]));
         Ok(std::array::from_fn(|i| Bound {
             name: self.names[i],
             value: self.truth[i],
@@ -151,11 +150,6 @@ impl<const N: usize> Experiment<'_, N> {
         let variance = |i: usize| inverse.as_ref().map_or(f64::INFINITY, |m| m[(i, i)]);
         Ok(std::array::from_fn(|i| noise * variance(i).sqrt()))
     }
-}
-
-fn spread(values: &[f64]) -> f64 {
-    let mean = crate::sim::score::mean(values.iter().copied());
-    crate::sim::score::mean(values.iter().map(|v| (v - mean).powi(2))).sqrt()
 }
 
 #[cfg(test)]

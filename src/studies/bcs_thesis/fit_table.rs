@@ -14,6 +14,7 @@ use crate::identify::fit::{
     Before, DeadTime, FitError, Level, Samples, SamplesError, Settings, Structure, fit,
 };
 use crate::identify::prbs::{NoSuchLength, Prbs};
+use crate::numeric::average::{mean, standard_deviation};
 use crate::numeric::lti::{Between, ModelError, simulate};
 
 const DT_S: f64 = 0.05;
@@ -133,7 +134,7 @@ fn run(number: u64) -> Result<Samples, FitTableError> {
     let drive = super::drive()?;
     let rpm = simulate(&drive, &volts, DT_S)?;
     let mut flow = simulate(&drive.series(&super::flow()?)?, &volts, DT_S)?;
-    let sigma = NOISE_SHARE * spread(&flow);
+    let sigma = NOISE_SHARE * standard_deviation(&flow);
     flow.iter_mut().zip(noise(number, sigma)).for_each(|(flow, noise)| *flow += noise);
     Ok(Samples::new(rpm, flow, DT_S)?)
 }
@@ -157,16 +158,6 @@ fn noise(seed: u64, sigma: f64) -> Vec<f64> {
             sigma * state
         })
         .collect()
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0.0), |(sum, n), v| (sum + v, n + 1.0));
-    sum / count
-}
-
-fn spread(row: &[f64]) -> f64 {
-    let middle = mean(row.iter().copied());
-    mean(row.iter().map(|v| (v - middle) * (v - middle))).sqrt()
 }
 
 /// A run's voltages about the operating point; each run goes on in the sequence

@@ -1,5 +1,6 @@
 //! Starts and stops beside fixed dwell times, as the thesis has them.
 
+pub mod bench;
 pub mod dwell;
 pub mod experiment;
 

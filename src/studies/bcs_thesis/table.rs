@@ -1,6 +1,7 @@
 //! The bead characterisation thesis beside its tables 3 and 4, and the corner that it
 //! leaves for later.
 
+mod around;
 mod corner;
 mod draw;
 mod start_stop;
@@ -16,7 +17,10 @@ use crate::extruder::feedforward::share_left;
 use crate::io::progress::Progress;
 use crate::numeric::lti::{Method, TransferFunction};
 use crate::studies::bcs_thesis as plant;
-use crate::studies::reproduce::{Effort, ReproduceError, Reproduced, Rows, Section, Source};
+use crate::studies::error::ReproduceError;
+use crate::studies::row::Rows;
+use crate::studies::source::Source;
+use crate::studies::study::{Effort, Reproduced, Section};
 
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 8;
@@ -207,14 +211,15 @@ fn sensing(seeds: u64, rows: &mut Rows) -> Result<Section, ReproduceError> {
     for mm in CAMERAS_MM {
         let seeds = seeds.min(CAMERA_SEEDS);
         let compared = compare(seeds, UNMODELLED_SHARE, Control::Observed(camera(mm)))?;
-        found.push((mm, compared.ratio));
+        found.push(draw::CameraGain { behind_mm: mm, ratio: compared.ratio });
     }
-    let bound: Vec<(f64, f64)> = (0..=100_u32)
+    let bound: Vec<draw::CameraGain> = (0..=100_u32)
         .map(|step| {
             let mm = 0.2 * f64::from(step);
             let left = share_left(camera_age_s(mm), CORRELATION_S);
             // The flow off varies by the unmodelled part as well.
-            (mm, (1.0 + UNMODELLED_SHARE.powi(2)).sqrt() / (UNMODELLED_SHARE * left))
+            let ratio = (1.0 + UNMODELLED_SHARE.powi(2)).sqrt() / (UNMODELLED_SHARE * left);
+            draw::CameraGain { behind_mm: mm, ratio }
         })
         .collect();
     Ok(Section {

@@ -107,10 +107,10 @@ pub fn settles(course: &Course) -> Option<f64> {
 fn oracle(screw: &Screw, first_effect_s: f64, law: &FillLaw) -> (usize, Vec<(f64, f64)>) {
     let first = (first_effect_s / STEP_S).ceil();
     let fill = |plug: f64| law.fill(plug);
-    let start = (START.get() / MM_PER_M, first_effect_s);
+    let start_m = START.get() / MM_PER_M;
     let lead = first * STEP_S - first_effect_s;
-    let plug = delay_free(screw, start, lead, fill).nth(1).unwrap_or(start.0);
-    let lengths = delay_free(screw, (plug, first * STEP_S), STEP_S, fill);
+    let plug = delay_free(screw, start_m, first_effect_s, lead, fill).nth(1).unwrap_or(start_m);
+    let lengths = delay_free(screw, plug, first * STEP_S, STEP_S, fill);
     let times = (0_u32..).map(|tick| (first + f64::from(tick)) * STEP_S);
     let points = times.zip(lengths.map(|length| length * MM_PER_M));
     let points = points.take_while(|(at_s, _)| *at_s <= SHORT_S).collect();
@@ -121,8 +121,8 @@ fn oracle(screw: &Screw, first_effect_s: f64, law: &FillLaw) -> (usize, Vec<(f64
 
 fn soonest(screw: &Screw, first_effect_s: f64) -> f64 {
     let band = (SETPOINT.plug.get() - BAND_MM) / MM_PER_M;
-    let start = (START.get() / MM_PER_M, first_effect_s);
-    let plugs = delay_free(screw, start, 1e-4, |_| SETPOINT.most);
+    let start_m = START.get() / MM_PER_M;
+    let plugs = delay_free(screw, start_m, first_effect_s, 1e-4, |_| SETPOINT.most);
     let times = (0_u32..).map(|tick| first_effect_s + 1e-4 * f64::from(tick));
     times.zip(plugs).find(|(_, plug)| *plug >= band).map_or(f64::INFINITY, |(at_s, _)| at_s)
 }

@@ -61,7 +61,8 @@ pub struct Outcome {
 pub fn suffer(
     case: &Case,
     trouble: Trouble,
-    (law, scheme): (FillLaw, Scheme),
+    law: FillLaw,
+    scheme: Scheme,
 ) -> Result<Outcome, RunError> {
     let screw = case.screw(TurnUnit::RadPerS)?;
     let mut plan = Plan { hold: HOLD, ..Plan::exact(screw, UNTIL_S) };
@@ -101,7 +102,7 @@ mod tests {
         let paper = FillLaw::Exponential(paper_law(&screw).unwrap());
         for law in [paper, saturated(&screw, 60.0).unwrap()] {
             for times in [0.9, 1.1] {
-                let found = suffer(&case, Trouble::Speed(times), (law, Scheme::Exact)).unwrap();
+                let found = suffer(&case, Trouble::Speed(times), law, Scheme::Exact).unwrap();
                 assert!(found.settles_s.unwrap() < 1.4);
                 assert!(found.overshoot_mm < 6.5 && found.late_mm < 1e-3);
             }
@@ -113,7 +114,7 @@ mod tests {
         let [case, ..] = CASES;
         let screw = case.screw(TurnUnit::RadPerS).unwrap();
         let law = saturated(&screw, 60.0).unwrap();
-        let found = suffer(&case, Trouble::Nozzle(1.1), (law, Scheme::Exact)).unwrap();
+        let found = suffer(&case, Trouble::Nozzle(1.1), law, Scheme::Exact).unwrap();
         assert!((0.5..1.5).contains(&found.late_mm), "{}", found.late_mm);
     }
 
@@ -123,7 +124,7 @@ mod tests {
         let screw = case.screw(TurnUnit::RadPerS).unwrap();
         let shaken = |slope| {
             let law = saturated(&screw, slope).unwrap();
-            suffer(&case, Trouble::Noise(0.5), (law, Scheme::Exact)).unwrap()
+            suffer(&case, Trouble::Noise(0.5), law, Scheme::Exact).unwrap()
         };
         let (flat, steep) = (shaken(36.0), shaken(100.0));
         assert!(steep.shaking > 2.0 * flat.shaking);

@@ -17,7 +17,10 @@ use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
 use crate::report::run::sections::legend;
 use crate::report::run::series::Series;
 use crate::report::run::series::series;
-use crate::studies::reproduce::{ReproduceError, Reproduced, Rows, Section, Source};
+use crate::studies::error::ReproduceError;
+use crate::studies::row::Rows;
+use crate::studies::source::Source;
+use crate::studies::study::{Reproduced, Section};
 
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 4;
@@ -155,9 +158,9 @@ fn robustness_rows(rows: &mut Rows) -> Result<(), RunError> {
     let paper = FillLaw::Exponential(paper_law(&screw)?);
     let ours = saturated(&screw, SLOPES_PER_M[0])?;
     for (name, trouble) in TROUBLES {
-        let theirs = suffer(&case, trouble, (paper, Scheme::Paper))?;
-        let same = suffer(&case, trouble, (paper, Scheme::Exact))?;
-        let ours = suffer(&case, trouble, (ours, Scheme::Exact))?;
+        let theirs = suffer(&case, trouble, paper, Scheme::Paper)?;
+        let same = suffer(&case, trouble, paper, Scheme::Exact)?;
+        let ours = suffer(&case, trouble, ours, Scheme::Exact)?;
         let title = format!("b at 200 Hz: {name}");
         let mut push = |what, of: fn(&Outcome) -> Option<f64>, ours: &Outcome| {
             rows.push(&title, what, [None, of(&theirs), of(ours)]);

@@ -49,6 +49,15 @@ impl Disturbance {
     }
 }
 
+/// A disturbance over one step: straight from its first to its last value.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Ramp {
+    /// At the start of the step, in the unit of its input.
+    pub first: f64,
+    /// At its end.
+    pub last: f64,
+}
+
 /// How the plant's parameters go with its inputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Parameters {
@@ -91,11 +100,11 @@ impl Strand {
     }
 
     /// Goes on for `dt_s` with inputs that are held and disturbances that run
-    /// straight from their first to their second value (Runge–Kutta, fourth
+    /// straight from their first to their last value (Runge–Kutta, fourth
     /// order).
-    pub fn step(&mut self, inputs: Inputs, feed: (f64, f64), plate: (f64, f64), dt_s: f64) {
+    pub fn step(&mut self, inputs: Inputs, feed: Ramp, plate: Ramp, dt_s: f64) {
         let slope = |state: [f64; 2], part: f64| {
-            let at = |ends: (f64, f64)| ends.0 + part * (ends.1 - ends.0);
+            let at = |ramp: Ramp| ramp.first + part * (ramp.last - ramp.first);
             self.slope(
                 state,
                 inputs.mass_flow_kg_per_s + at(feed),

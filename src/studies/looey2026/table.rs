@@ -11,8 +11,11 @@ use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
 use crate::report::run::sections::legend;
 use crate::report::run::series::Series;
 use crate::report::run::series::series;
+use crate::studies::error::ReproduceError;
 use crate::studies::looey2026 as experiments;
-use crate::studies::reproduce::{Effort, ReproduceError, Reproduced, Rows, Section, Source};
+use crate::studies::row::Rows;
+use crate::studies::source::Source;
+use crate::studies::study::{Effort, Reproduced, Section};
 
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 14;

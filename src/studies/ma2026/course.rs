@@ -1,6 +1,7 @@
 //! What a run came to, and its figures as the paper has them.
 
-use super::LOAD_RPM;
+use super::plant::LOAD_RPM;
+use crate::numeric::average::{mean, rms, standard_deviation};
 use crate::sim::pressure::TICK_S;
 
 /// What a run came to.
@@ -72,15 +73,15 @@ impl Course {
     /// Root mean square and largest size of the error after `from_s` \[MPa\].
     pub fn tracking(&self, from_s: f64) -> (f64, f64) {
         let errors = self.after(from_s, self.errors());
-        (mean(errors.iter().map(|e| e * e)).sqrt(), errors.iter().fold(0.0, |m, e| m.max(e.abs())))
+        (rms(errors.iter().copied()), errors.iter().fold(0.0, |m, e| m.max(e.abs())))
     }
 
     /// Standard deviation of the pressure \[MPa\] and variation of the speed
     /// \[%\] after `from_s`.
     pub fn steadiness(&self, from_s: f64) -> (f64, f64) {
-        let (_, sigma) = spread(&self.after(from_s, self.pressure.iter().copied()));
-        let (mean, deviation) = spread(&self.after(from_s, self.speed.iter().copied()));
-        (sigma, 100.0 * deviation / mean)
+        let sigma = standard_deviation(&self.after(from_s, self.pressure.iter().copied()));
+        let speeds = self.after(from_s, self.speed.iter().copied());
+        (sigma, 100.0 * standard_deviation(&speeds) / mean(speeds.iter().copied()))
     }
 
     fn errors(&self) -> impl Iterator<Item = f64> {
@@ -92,18 +93,7 @@ impl Course {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "a count of ticks")]
-pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
-    sum / count.max(1) as f64
-}
-
 /// To a thousandth: what is less is how the last step of an approach falls.
 fn rounded(percent: f64) -> f64 {
     (percent * 1e3).round() / 1e3
-}
-
-fn spread(values: &[f64]) -> (f64, f64) {
-    let middle = mean(values.iter().copied());
-    (middle, mean(values.iter().map(|value| (value - middle).powi(2))).sqrt())
 }

@@ -1,6 +1,7 @@
 //! How far a process may be from the model until a law swings, tried out.
 
-use super::{DEAD_TIME_S, Experiment, Factors, LOAD_RPM, Tried};
+use super::experiment::{Experiment, Tried};
+use super::plant::{DEAD_TIME_S, Factors, LOAD_RPM};
 use crate::extruder::pressure::PressureError;
 use crate::sim::pressure::Load;
 

@@ -1,5 +1,5 @@
-use super::course::mean;
 use super::*;
+use crate::numeric::average::mean;
 
 fn step(tried: Tried, factors: Factors) -> StepFigures {
     Experiment::step(factors).run(tried).unwrap().step_figures()

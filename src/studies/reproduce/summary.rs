@@ -4,7 +4,8 @@
 use maud::{Markup, html};
 
 use super::table::number;
-use super::{Reproduced, Row};
+use crate::studies::row::Row;
+use crate::studies::study::Reproduced;
 
 /// Shares of a published number within which it counts as met.
 const NEAR: [f64; 2] = [0.02, 0.1];

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::Row;
+use crate::studies::row::Row;
 
 const HEADS: [&str; 6] = ["case", "quantity", "unit", "published", "simulated", "ours"];
 

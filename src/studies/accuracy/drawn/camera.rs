@@ -26,7 +26,7 @@ pub fn expose(light: &[f32], scene: &Scene, draw: &mut Draw) -> Vec<u8> {
     };
     let pixels: Vec<u8> = light.iter().enumerate().map(pixel).collect();
     match scene.jpeg {
-        Some(quality) => compress(&pixels, scene.size, quality).unwrap_or(pixels),
+        Some(quality) => compress(&pixels, scene.size.0, scene.size.1, quality).unwrap_or(pixels),
         None => pixels,
     }
 }
@@ -58,7 +58,7 @@ impl Vignetting {
 }
 
 /// A picture after it was a JPEG; none where it cannot be encoded.
-fn compress(pixels: &[u8], (width, height): (usize, usize), quality: u8) -> Option<Vec<u8>> {
+fn compress(pixels: &[u8], width: usize, height: usize, quality: u8) -> Option<Vec<u8>> {
     let (width, height) = (u32::try_from(width).ok()?, u32::try_from(height).ok()?);
     let picture = GrayImage::from_raw(width, height, pixels.to_vec())?;
     let mut file = Vec::new();
@@ -100,7 +100,7 @@ mod tests {
         let pixels: Vec<u8> =
             (0..6400).map(|k| u8::try_from(hash::mix(&[k]) % 100).unwrap() + 50).collect();
         let rms = |quality: u8| {
-            let after = compress(&pixels, (80, 80), quality).unwrap();
+            let after = compress(&pixels, 80, 80, quality).unwrap();
             let squares = pixels.iter().zip(&after).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2));
             (squares.sum::<f64>() / 6400.0).sqrt()
         };

@@ -1,5 +1,7 @@
 //! Numbers of a frame, with a record of those that a figure is split by.
 
+use std::ops::Range;
+
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -35,20 +37,20 @@ impl Draw {
     }
 
     /// Uniform in the logarithm, and kept in the record.
-    pub fn log(&mut self, name: &'static str, range: (f64, f64)) -> f64 {
-        let value = self.log_unnamed(range);
+    pub fn log(&mut self, name: &'static str, range: Range<f64>) -> f64 {
+        let value = self.log_unnamed(range.clone());
         self.keep(name, value, range);
         value
     }
 
     /// The same without record.
-    pub fn log_unnamed(&mut self, (from, to): (f64, f64)) -> f64 {
-        from * libm::exp(self.unit() * libm::log(to / from))
+    pub fn log_unnamed(&mut self, range: Range<f64>) -> f64 {
+        range.start * libm::exp(self.unit() * libm::log(range.end / range.start))
     }
 
     /// Keeps a number that follows from others in the record.
-    pub fn keep(&mut self, name: &'static str, value: f64, range: (f64, f64)) {
-        self.record.push(Parameter { name, value, range });
+    pub fn keep(&mut self, name: &'static str, value: f64, range: Range<f64>) {
+        self.record.push(Parameter { name, value, range: (range.start, range.end) });
     }
 
     /// Uniform between two numbers.
@@ -88,8 +90,8 @@ mod tests {
     #[test]
     fn numbers_are_uniform_in_their_logarithm() {
         let mut draw = Draw::new("test", 1);
-        let (n, range) = (10_000, (0.5, 8.0));
-        let below = (0..n).filter(|_| draw.log_unnamed(range) < 2.0).count();
+        let n = 10_000;
+        let below = (0..n).filter(|_| draw.log_unnamed(0.5..8.0) < 2.0).count();
         // Half of them, with a standard deviation of 50.
         assert!((4_800..5_200).contains(&below), "{below}");
     }

@@ -1,6 +1,8 @@
 //! A long bead with torn edges that passes through the gauge frame by frame: what
 //! roughness over successive frames is judged by.
 
+use std::ops::Range;
+
 use super::camera;
 use super::draw::Draw;
 use super::paint::{Painted, paint};
@@ -83,7 +85,7 @@ impl LongBead {
     }
 
     /// Range that the correlation length was drawn from \[px\].
-    pub fn lengths_px() -> (f64, f64) {
+    pub fn lengths_px() -> Range<f64> {
         recipes::LENGTH_PX
     }
 

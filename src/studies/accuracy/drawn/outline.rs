@@ -96,8 +96,8 @@ impl Outline {
         let mut right = place(bead.axis + bead.half, right);
         let mut holes = Vec::new();
         if let Some(dug) = &scene.holes {
-            cut_bays(dug, &mut left, (bead.axis - bead.half, 1.0), draw);
-            cut_bays(dug, &mut right, (bead.axis + bead.half, -1.0), draw);
+            cut_bays(dug, &mut left, bead.axis - bead.half, 1.0, draw);
+            cut_bays(dug, &mut right, bead.axis + bead.half, -1.0, draw);
             holes = dig(dug, bead, count, draw);
         }
         Self { left, right, far, holes, axis_px: bead.axis, width_px: 2.0 * bead.half }
@@ -175,7 +175,7 @@ fn common_share(width_px: f64, roughness_px: f64) -> f64 {
 }
 
 /// Cuts bays out of an edge that lies at a place, towards +1 or −1.
-fn cut_bays(dug: &Holes, edge: &mut [f64], (at_px, inwards): (f64, f64), draw: &mut Draw) {
+fn cut_bays(dug: &Holes, edge: &mut [f64], at_px: f64, inwards: f64, draw: &mut Draw) {
     let height = height_of(edge.len());
     for _ in 0..dug.count {
         let bay = Disc { x: at_px, y: draw.between(0.0, height), radius: dug.size_px / 2.0 };

@@ -70,7 +70,7 @@ pub fn paint(scene: &Scene, draw: &mut Draw) -> Painted {
         let concrete = layer(&|step| f64::from(u8::from(step.concrete)));
         for (patches, on_concrete) in textures.into_iter().zip([true, false]) {
             let asked = Texture { size_grey: patches.size_grey, length_px: patches.length_px };
-            let Some(pattern) = texture(&asked, scene.size, draw.key()) else { continue };
+            let Some(pattern) = texture(&asked, width, height, draw.key()) else { continue };
             for ((light, share), value) in light.iter_mut().zip(&concrete).zip(pattern) {
                 *light += value * if on_concrete { *share } else { 1.0 - share };
             }

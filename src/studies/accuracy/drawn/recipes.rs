@@ -3,48 +3,50 @@
 //! are what is asked of the measurement; the others are those of real concrete
 //! (`ACCURACY.md`, "Real and rendered").
 
+use std::ops::Range;
+
 use super::draw::Draw;
 use super::scene::{Groove, Holes, Patches, Rib, Scene, Tear};
 
 /// Roughness of torn edges \[px\].
-const TORN_PX: (f64, f64) = (0.5, 6.0);
+const TORN_PX: Range<f64> = 0.5..6.0;
 /// Correlation length of rough edges \[px\].
-pub const LENGTH_PX: (f64, f64) = (3.0, 40.0);
+pub const LENGTH_PX: Range<f64> = 3.0..40.0;
 /// Largest roughness, as a fraction of the correlation length.
 const STEEPEST: f64 = 0.5;
 /// Roughness of edges in sets about something else \[px\].
-const ROUGHNESS_PX: (f64, f64) = (0.5, 2.0);
+const ROUGHNESS_PX: Range<f64> = 0.5..2.0;
 /// Roughness of edges in sets about what concrete looks like \[px\]: that of labels
 /// drawn by hand.
-const CONCRETE_PX: (f64, f64) = (0.5, 4.0);
+const CONCRETE_PX: Range<f64> = 0.5..4.0;
 /// Largest roughness of a narrow bead, as a fraction of its width.
 const NARROW_ROUGHNESS: f64 = 0.03;
 
 /// Diameter of holes and bays \[px\].
-const HOLE_PX: (f64, f64) = (2.0, 15.0);
+const HOLE_PX: Range<f64> = 2.0..15.0;
 /// Bays in each edge.
-const BAYS: (f64, f64) = (1.0, 6.0);
+const BAYS: Range<f64> = 1.0..6.0;
 /// Width of a groove \[px\].
-const GROOVE_PX: (f64, f64) = (2.0, 40.0);
+const GROOVE_PX: Range<f64> = 2.0..40.0;
 /// Brightness of grooves and holes \[grey levels\]: of real grooves that are wide enough
 /// to show it, as far as they are darker than the ground.
-const GROOVE_GREY: (f64, f64) = (2.0, 60.0);
+const GROOVE_GREY: Range<f64> = 2.0..60.0;
 /// Texture of the bead \[grey levels\] and its correlation length \[px\]: up to the
 /// fraction of the contrast that real beads have, 0.38.
-const TEXTURE_GREY: (f64, f64) = (5.0, 30.0);
-const TEXTURE_PX: (f64, f64) = (2.0, 8.0);
+const TEXTURE_GREY: Range<f64> = 5.0..30.0;
+const TEXTURE_PX: Range<f64> = 2.0..8.0;
 
 /// Step and noise in low light \[grey levels\], on a ground that is nearly dark.
-const LOW_CONTRAST_GREY: (f64, f64) = (8.0, 30.0);
-const LOW_LIGHT_NOISE_GREY: (f64, f64) = (2.0, 6.0);
+const LOW_CONTRAST_GREY: Range<f64> = 8.0..30.0;
+const LOW_LIGHT_NOISE_GREY: Range<f64> = 2.0..6.0;
 const LOW_LIGHT_GROUND_GREY: f64 = 20.0;
 
 /// Contrast of ribs, as a fraction of the edges'.
-pub const WEAK_RIBS: (f64, f64) = (0.1, 0.6);
+pub const WEAK_RIBS: Range<f64> = 0.1..0.6;
 /// Contrast of ribs that may be taken for edges.
-pub const STRONG_RIBS: (f64, f64) = (0.6, 1.0);
+pub const STRONG_RIBS: Range<f64> = 0.6..1.0;
 /// Width of a rib \[px\].
-const RIB_PX: (f64, f64) = (3.0, 30.0);
+const RIB_PX: Range<f64> = 3.0..30.0;
 /// Distance of a rib from the edges at least: in pixels, in blurs, and in roughnesses
 /// on top of these.
 const RIB_CLEARANCE_PX: f64 = 6.0;
@@ -52,45 +54,45 @@ const RIB_CLEARANCE_BLURS: f64 = 3.0;
 const RIB_CLEARANCE_ROUGHNESSES: f64 = 4.0;
 
 /// Sideways motion that is measured \[px\].
-pub const SHORT_MOTION_PX: (f64, f64) = (5.0, 15.0);
+pub const SHORT_MOTION_PX: Range<f64> = 5.0..15.0;
 /// Sideways motion that may be refused \[px\].
-pub const LONG_MOTION_PX: (f64, f64) = (15.0, 40.0);
+pub const LONG_MOTION_PX: Range<f64> = 15.0..40.0;
 
 /// Step of a bead on a ground with a pattern \[grey levels\].
-const CONTRAST_GREY: (f64, f64) = (20.0, 100.0);
+const CONTRAST_GREY: Range<f64> = 20.0..100.0;
 /// Weakest pattern of the ground \[grey levels\].
 const WEAKEST_PATTERN_GREY: f64 = 3.0;
 /// Pattern of the ground, as a fraction of the contrast: one that is measured on, and
 /// one that may be refused.
-pub const WEAK_PATTERN: (f64, f64) = (0.03, 1.0 / 3.0);
+pub const WEAK_PATTERN: Range<f64> = 0.03..1.0 / 3.0;
 /// See [`WEAK_PATTERN`].
-pub const STRONG_PATTERN: (f64, f64) = (1.0 / 3.0, 1.0);
+pub const STRONG_PATTERN: Range<f64> = 1.0 / 3.0..1.0;
 /// Correlation length of the ground's pattern \[px\].
-const PATTERN_PX: (f64, f64) = (2.0, 12.0);
+const PATTERN_PX: Range<f64> = 2.0..12.0;
 
 /// Exponent of a camera.
-pub const GAMMA: (f64, f64) = (0.45, 2.2);
+pub const GAMMA: Range<f64> = 0.45..2.2;
 /// Exponent of a camera that is nearly linear.
-pub const NEAR_GAMMA: (f64, f64) = (0.9, 1.1);
+pub const NEAR_GAMMA: Range<f64> = 0.9..1.1;
 /// Quality of a JPEG. The picture's blocks are 8 px wide: every place within one is
 /// drawn.
-const QUALITY: (f64, f64) = (30.0, 95.0);
+const QUALITY: Range<f64> = 30.0..95.0;
 const BLOCK_PX: f64 = 8.0;
 /// Brightness in the middle over that in the corners.
-const VIGNETTING: (f64, f64) = (1.1, 4.0);
+const VIGNETTING: Range<f64> = 1.1..4.0;
 /// Blur of the lens \[px\].
-const BLUR_PX: (f64, f64) = (0.5, 6.0);
+const BLUR_PX: Range<f64> = 0.5..6.0;
 /// Nominal width of a bead \[px\]: 5 to 600 px, less what a frame's differs from it.
-const WIDTH_PX: (f64, f64) = (5.0 + WIDTH_SPREAD_PX, 600.0 - WIDTH_SPREAD_PX);
+const WIDTH_PX: Range<f64> = 5.0 + WIDTH_SPREAD_PX..600.0 - WIDTH_SPREAD_PX;
 const WIDTH_SPREAD_PX: f64 = 1.0;
 /// Smallest width in blurs.
 const MIN_BLURS: f64 = 4.0;
 
 /// Roughness and correlation length of a frame's edges.
-fn rough(draw: &mut Draw, roughness_px: (f64, f64)) -> Tear {
+fn rough(draw: &mut Draw, roughness_px: Range<f64>) -> Tear {
     let length_px = draw.log("length_px", LENGTH_PX);
-    let most = roughness_px.1.min(STEEPEST * length_px);
-    let drawn = draw.log_unnamed((roughness_px.0, most));
+    let most = roughness_px.end.min(STEEPEST * length_px);
+    let drawn = draw.log_unnamed(roughness_px.start..most);
     draw.keep("roughness_px", drawn, roughness_px);
     Tear { roughness_px: drawn, length_px }
 }
@@ -100,7 +102,7 @@ fn usual(draw: &mut Draw) -> Scene {
     half_rough(draw, ROUGHNESS_PX)
 }
 
-fn half_rough(draw: &mut Draw, roughness_px: (f64, f64)) -> Scene {
+fn half_rough(draw: &mut Draw, roughness_px: Range<f64>) -> Scene {
     if draw.one_of(2.0) {
         return Scene { edges: rough(draw, roughness_px), ..Scene::default() };
     }
@@ -150,7 +152,7 @@ pub fn low_light(draw: &mut Draw) -> Scene {
 }
 
 /// One or two lines along the bead; two lie on either side of its axis.
-pub fn ribs(draw: &mut Draw, contrast: (f64, f64)) -> Scene {
+pub fn ribs(draw: &mut Draw, contrast: Range<f64>) -> Scene {
     let share = draw.log("rib_of_contrast", contrast);
     let width_px = draw.log("rib_px", RIB_PX);
     let scene = usual(draw);
@@ -172,16 +174,16 @@ pub fn ribs(draw: &mut Draw, contrast: (f64, f64)) -> Scene {
 }
 
 /// Motion across the bead while the shutter is open.
-pub fn motion(draw: &mut Draw, length_px: (f64, f64)) -> Scene {
+pub fn motion(draw: &mut Draw, length_px: Range<f64>) -> Scene {
     let motion_px = draw.log("motion_px", length_px);
     Scene { motion_px, ..usual(draw) }
 }
 
 /// A pattern on the ground.
-pub fn pattern(draw: &mut Draw, of_contrast: (f64, f64)) -> Scene {
+pub fn pattern(draw: &mut Draw, of_contrast: Range<f64>) -> Scene {
     let contrast = draw.log("contrast_grey", CONTRAST_GREY);
-    let weakest = of_contrast.0.max(WEAKEST_PATTERN_GREY / contrast);
-    let share = draw.log_unnamed((weakest, of_contrast.1));
+    let weakest = of_contrast.start.max(WEAKEST_PATTERN_GREY / contrast);
+    let share = draw.log_unnamed(weakest..of_contrast.end);
     draw.keep("pattern_of_contrast", share, of_contrast);
     let length_px = draw.log("pattern_px", PATTERN_PX);
     let scene = usual(draw);
@@ -190,7 +192,7 @@ pub fn pattern(draw: &mut Draw, of_contrast: (f64, f64)) -> Scene {
 }
 
 /// A camera with a gamma.
-pub fn gamma(draw: &mut Draw, range: (f64, f64)) -> Scene {
+pub fn gamma(draw: &mut Draw, range: Range<f64>) -> Scene {
     let gamma = draw.log("gamma", range);
     Scene { gamma, ..usual(draw) }
 }

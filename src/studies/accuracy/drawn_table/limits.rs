@@ -1,6 +1,6 @@
 //! Which requirements of a set some of its frames miss.
 
-use super::{DrawnFigures, Part};
+use super::figures::{DrawnFigures, Part};
 use crate::studies::accuracy::drawn::Requirements;
 
 /// Frames that the limits are made for: figures over as many have no allowance.

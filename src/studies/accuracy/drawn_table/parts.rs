@@ -1,15 +1,22 @@
 //! The parts of a set: all frames, and the thirds of each range.
 
-use super::{DrawnFigures, DrawnOutcome, Part};
+use std::collections::BTreeMap;
+
+use super::figures::{DrawnFigures, DrawnOutcome, Part};
+use super::limits;
+use crate::numeric::statistics::Moments;
 use crate::studies::accuracy::drawn::{DrawnSet, Parameter};
+use crate::studies::accuracy::figures::share;
 
 /// Parts of a range, equal in the logarithm.
 const PARTS: u32 = 3;
+/// Frames of the largest errors that are listed.
+const WORST: usize = 5;
 
 /// Figures of a set: over all frames first, then within the thirds of each range.
 pub fn figures(set: &DrawnSet, outcomes: &[DrawnOutcome]) -> Vec<DrawnFigures> {
     let all: Vec<&DrawnOutcome> = outcomes.iter().collect();
-    let mut figures = vec![DrawnFigures::of(set, Part::All, &all)];
+    let mut figures = vec![figures_of(set, Part::All, &all)];
     let Some(first) = outcomes.first() else { return figures };
     for parameter in &first.parameters {
         let value = |outcome: &DrawnOutcome| {
@@ -30,14 +37,54 @@ pub fn figures(set: &DrawnSet, outcomes: &[DrawnOutcome]) -> Vec<DrawnFigures> {
         }
         if !zero.is_empty() {
             let part = Part::Zero { parameter: parameter.name };
-            figures.push(DrawnFigures::of(set, part, &zero));
+            figures.push(figures_of(set, part, &zero));
         }
         for (number, some) in (0..PARTS).zip(parts) {
             let (from, to) = (end(parameter, number), end(parameter, number + 1));
             let part = Part::Third { parameter: parameter.name, from, to };
-            figures.push(DrawnFigures::of(set, part, &some));
+            figures.push(figures_of(set, part, &some));
         }
     }
+    figures
+}
+
+/// Figures of some frames of a set.
+fn figures_of(set: &DrawnSet, part: Part, outcomes: &[&DrawnOutcome]) -> DrawnFigures {
+    let (mut errors, mut ratios) = (Moments::default(), Moments::default());
+    let mut refused = BTreeMap::new();
+    let (mut silent, mut without_gamma) = (0, 0);
+    let mut by_ratio = Vec::new();
+    for outcome in outcomes {
+        match outcome.width {
+            Ok(found) => {
+                let ratio = found.error_px / found.sigma_px;
+                errors.add(found.error_px);
+                ratios.add(ratio);
+                silent += usize::from(found.is_silent());
+                by_ratio.push((ratio.abs(), outcome.frame));
+            }
+            Err(refusal) => {
+                *refused.entry(refusal.status).or_insert(0) += 1;
+                without_gamma += usize::from(!refusal.names_gamma);
+            }
+        }
+    }
+    by_ratio.sort_by(|one, other| other.0.total_cmp(&one.0));
+    let mut figures = DrawnFigures {
+        set: set.name,
+        part,
+        frames: outcomes.len(),
+        measured_share: share(by_ratio.len(), outcomes.len()),
+        bias_px: errors.mean(),
+        rmse_px: errors.rms(),
+        z: ratios.rms(),
+        silent,
+        refused,
+        without_gamma,
+        worst: by_ratio.iter().take(WORST).map(|(_, frame)| *frame).collect(),
+        missed: Vec::new(),
+    };
+    figures.missed = limits::misses(&figures, &set.requirements, by_ratio.len());
     figures
 }
 

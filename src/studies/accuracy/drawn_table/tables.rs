@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{DrawnFigures, Part};
+use super::figures::{DrawnFigures, Part};
 use crate::studies::accuracy::drawn::DrawnSet;
 use crate::studies::accuracy::table::{aligned, marked};
 

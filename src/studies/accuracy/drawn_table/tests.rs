@@ -1,5 +1,5 @@
 use super::*;
-use crate::studies::accuracy::drawn;
+use crate::studies::accuracy::drawn::{self, DrawnSet, Parameter};
 
 fn set(name: &str) -> DrawnSet {
     drawn::named(name).remove(0)

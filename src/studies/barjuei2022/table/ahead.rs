@@ -4,14 +4,16 @@
 
 use maud::html;
 
-use super::{Experiments, draw};
+use super::draw;
+use super::experiments::Experiments;
 use crate::core::units::Mm;
 use crate::io::progress::Progress;
 use crate::studies::barjuei2022::{
     Contender, Disturbance, LAYERS, LayerResult, Rates, Wrong, lay, settles_unseen, step_settles,
     unrest, wrong,
 };
-use crate::studies::reproduce::{ReproduceError, Section};
+use crate::studies::error::ReproduceError;
+use crate::studies::study::Section;
 
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 5;
@@ -109,12 +111,12 @@ impl Experiments {
                 let what = ("integral of the error's size, over the paper's", "1");
                 self.rows.push(&case, what, [None, Some(1.0), Some(ratio)]);
                 let who = Contender::by_distance(rates);
-                let unseen = settles_unseen((&quiet, &self.run), who, target, self.seeds)?;
+                let unseen = settles_unseen(&quiet, &self.run, who, target, self.seeds)?;
                 let what = ("settles with nothing seen before after", "mm");
                 self.rows.push(&case, what, [None, None, Some(unseen)]);
             }
         }
-        let step = |who| step_settles((&quiet, &self.run), who, self.seeds);
+        let step = |who| step_settles(&quiet, &self.run, who, self.seeds);
         let theirs = step(Contender::Paper)?;
         for (rates, name) in COLUMNS {
             let ours = step(Contender::by_distance(rates))?;
@@ -145,7 +147,7 @@ impl Experiments {
         for (rates, name) in COLUMNS {
             for (what, exponent, told) in cases {
                 let who = Contender::Distance(rates, exponent);
-                let found = wrong((&self.cell, &self.run), who, told, self.seeds)?;
+                let found = wrong(&self.cell, &self.run, who, told, self.seeds)?;
                 let case = format!("42 mm, {what}, {name}");
                 for (quantity, found) in [
                     ("RMS error of the bead once settled", found.median_mm),
@@ -188,7 +190,7 @@ impl Experiments {
     /// The paper's loop, and by distance at both rates.
     fn answer(&self, what: Disturbance) -> Result<[f64; 3], ReproduceError> {
         let seeds = disturbed_seeds(self.seeds);
-        let by = |who| unrest((&self.cell, &self.run), who, what, seeds);
+        let by = |who| unrest(&self.cell, &self.run, who, what, seeds);
         let [(slow, _), (fast, _)] = COLUMNS;
         let ours = [slow, fast].map(Contender::by_distance);
         Ok([by(Contender::Paper)?, by(ours[0])?, by(ours[1])?])

@@ -7,8 +7,8 @@ use crate::report::run::palette;
 use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
 use crate::report::run::sections::legend;
 use crate::report::run::series::series;
-use crate::sim::score::Score;
 use crate::studies::barjuei2022::StandOff;
+use crate::trials::score::Score;
 use crate::width_control::limiter::Limits;
 
 /// A layer by the paper's loop and by distance: widths and speeds over path.

@@ -1,7 +1,8 @@
 //! What is usual: an extruder that is driven constantly, or in proportion to the robot's
 //! speed.
 
-use super::{BEAD, CornerError, Laid, Run, Scenario};
+use super::plant::{Laid, Run};
+use super::scenario::{BEAD, CornerError, Scenario};
 use crate::plan::SpeedProfile;
 
 /// How the voltage is found.

@@ -1,6 +1,7 @@
 //! A run through the corner: voltage to flow to what is laid along the path.
 
-use super::{BEAD, CornerError, Errors, JUDGED_MM, Scenario, UNMODELLED};
+use super::scenario::{BEAD, CornerError, JUDGED_MM, Scenario, UNMODELLED};
+use crate::numeric::average::{mean, standard_deviation};
 use crate::numeric::lti::{Between, Simulator};
 use crate::plan::SpeedProfile;
 use crate::sim::hash::{mix, normal_pair};
@@ -13,6 +14,15 @@ const EVERY_MM: f64 = 0.5;
 const PLACES: i32 = 200;
 /// A flow that differs by less than this share from that before the corner is not changed.
 const CHANGED: f64 = 0.01;
+
+/// Root mean square of the error of the width, as a share of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Errors {
+    /// Where the flow is as modelled.
+    pub quiet: f64,
+    /// With flow that no model tells, over all seeds.
+    pub noisy: f64,
+}
 
 /// A run as the model has it.
 #[derive(Debug, Clone, PartialEq)]
@@ -182,13 +192,11 @@ fn moments(until_s: f64) -> impl Iterator<Item = f64> {
 }
 
 fn mean_square(values: &[f64]) -> f64 {
-    crate::sim::score::mean(values.iter().map(|value| value * value))
+    mean(values.iter().map(|value| value * value))
 }
 
 fn deviation(flow: &[f64], from: usize, to: usize) -> f64 {
-    let part = flow.get(from..to.min(flow.len())).unwrap_or_default();
-    let mean = crate::sim::score::mean(part.iter().copied());
-    crate::sim::score::mean(part.iter().map(|q| (q - mean).powi(2))).sqrt()
+    standard_deviation(flow.get(from..to.min(flow.len())).unwrap_or_default())
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a short time")]

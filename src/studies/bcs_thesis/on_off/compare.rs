@@ -2,8 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::{Control, Course, Run, mean};
+use super::Control;
+use super::course::Course;
+use super::wheel::Run;
 use crate::extruder::feedforward::FeedforwardError;
+use crate::numeric::average::mean;
 
 /// Means over the seeds.
 #[derive(Debug, Clone, PartialEq)]

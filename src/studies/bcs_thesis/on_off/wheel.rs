@@ -1,15 +1,16 @@
 //! The wheel, what is laid on it and what sensors see of that.
 
-use super::{
-    AREA_MM2, Course, EXPONENT, JUDGED_FROM_S, MM_PER_S_PER_RPM, Run, STEP_S, Sensors, at, mean,
-    motor, to_steps,
-};
+use super::course::{AREA_MM2, Course, JUDGED_FROM_S, MM_PER_S_PER_RPM, STEP_S, at, to_steps};
 use crate::core::units::Mm3PerS;
 use crate::extruder::feedforward::FeedforwardError;
 use crate::extruder::feedforward::FlowSeen;
+use crate::numeric::average::mean;
 use crate::numeric::lti::{Between, Simulator};
 use crate::sim::hash::{mix, normal_pair};
+use crate::studies::bcs_thesis::wheel as motor;
 
+/// Exponent of the flow over the pressure, Ma et al. 2026.
+pub const EXPONENT: f64 = 1.58;
 /// Height at which a section of 45 mm² is as wide as the 13.1 mm that the
 /// thesis reports: A = (W − H)·H + π·H²/4 \[mm\].
 const HEIGHT_MM: f64 = 3.654;
@@ -17,6 +18,43 @@ const PRESSURE_MPA: f64 = 0.6;
 const PRESSURE_VARIANCE_MPA2: f64 = 4.98e-5;
 const CAMERA_SIGMA_MM2: f64 = 0.2;
 const CAMERA_LATE_STEPS: usize = 20;
+
+/// What is measured at 50 Hz. The plant's own noise is known to the observer
+/// by its size and its correlation time, as an identified model tells them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensors {
+    /// A camera or profilometer this far behind the nozzle \[mm\], whose
+    /// sections have a standard deviation of 0.2 mm² and come 20 ms late.
+    pub camera_mm: Option<f64>,
+    /// Melt pressure at the nozzle, with the flow as a power of it and the
+    /// noise of Ma et al. 2026 (σ = 0.00706 MPa) at 0.6 MPa.
+    pub pressure: bool,
+    /// The exponent that the controller takes for the pressure's 1.58.
+    pub exponent: f64,
+}
+
+/// What came of a run, over the time that is judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Root mean square of the section about its own mean \[mm²\].
+    pub area_rmse_mm2: f64,
+    /// Mean size of the same \[mm²\].
+    pub area_mae_mm2: f64,
+    /// Mean section \[mm²\].
+    pub area_mean_mm2: f64,
+    /// The same of the width, at a height that stays \[mm\].
+    pub width_rmse_mm: f64,
+    /// \[mm\].
+    pub width_mae_mm: f64,
+    /// Time \[s\] and section \[mm²\], every 20 ms.
+    pub area: Vec<(f64, f64)>,
+    /// Time \[s\] and width at a height that stays \[mm\], every 20 ms.
+    pub width: Vec<(f64, f64)>,
+    /// Time \[s\] and flow \[mm³/s\], every 20 ms.
+    pub flow: Vec<(f64, f64)>,
+    /// Time \[s\] and speed of the wheel's surface \[mm/s\], every 20 ms.
+    pub speed: Vec<(f64, f64)>,
+}
 
 /// The wheel and what has been laid on it.
 pub(super) struct Wheel {

@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
+use super::bench::{Bench, Score, Strategy};
 use crate::core::time::Span;
 use crate::extruder::start_stop::Pause;
-use crate::sim::start_stop::bead::{Bench, Score, Strategy};
-use crate::sim::start_stop::melt::Machine;
+use crate::sim::melt::Machine;
 
 /// The same times at every start and every stop. bcs-thesis, section 1.3.4.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,13 +4,15 @@
 
 use rayon::prelude::*;
 
+use super::bench::{Bench, IDLE_S, Score, Strategy, Watched};
 use super::dwell::{Dwell, tune};
 use crate::core::time::Span;
 use crate::core::units::{Mm3PerS, MmPerS};
 use crate::extruder::start_stop::{Laid, Timing};
 use crate::identify::start_stop::parameters::StartStopError;
 use crate::identify::start_stop::{StartStopFit, StartStopFitError, fit};
-use crate::sim::start_stop::{Bench, IDLE_S, Machine, Recording, Score, Strategy, Watched, record};
+use crate::sim::melt::Machine;
+use crate::sim::melt_log::{Recording, record};
 
 /// Share of its speed down to which a robot follows the flow.
 pub const FOLLOWS_SHARE: f64 = 0.05;

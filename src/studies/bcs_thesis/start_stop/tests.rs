@@ -2,12 +2,13 @@
 
 use std::sync::LazyLock;
 
+use super::bench::*;
 use super::dwell::{Dwell, tune};
 use super::*;
 use crate::extruder::start_stop::Timing;
 use crate::identify::start_stop::StartStopFit;
 use crate::identify::start_stop::parameters::StartStop;
-use crate::sim::start_stop::*;
+use crate::sim::melt::*;
 use crate::studies::bcs_thesis::start_stop::experiment::bench;
 
 /// A machine from which nothing random comes.

@@ -3,12 +3,15 @@
 
 use rayon::prelude::*;
 
+use super::around::Around;
 use super::draw;
 use crate::plan::Plan;
 use crate::studies::bcs_thesis::corner::{
     Baseline, CornerError, Drive, Errors, JUDGED_MM, Row, Run, Scenario, UNMODELLED,
 };
-use crate::studies::reproduce::{Effort, ReproduceError, Rows, Section};
+use crate::studies::error::ReproduceError;
+use crate::studies::row::Rows;
+use crate::studies::study::{Effort, Section};
 
 /// Seeds of the flow that no model tells.
 pub const SEEDS: u64 = 20;
@@ -33,30 +36,6 @@ const LENGTHS: [(f64, &str); 5] = [
     (25.0, "width error RMS, mean over 25 mm"),
     (30.0, "width error RMS, mean over 30 mm"),
 ];
-
-/// What is drawn of a run.
-#[derive(Debug)]
-pub struct Around {
-    /// Its name.
-    pub name: &'static str,
-    /// Places \[mm\] and by how much the width is off \[%\].
-    pub error: Vec<(f64, f64)>,
-    /// Places and the robot's speed \[mm/s\].
-    pub speed: Vec<(f64, f64)>,
-    /// Places and the flow \[mm³/s\].
-    pub flow: Vec<(f64, f64)>,
-}
-
-impl Around {
-    fn of(name: &'static str, run: &Run) -> Self {
-        let percent = |(at, error): (f64, f64)| (at, 100.0 * error);
-        let over = |of: fn((f64, f64, f64)) -> f64| -> Vec<(f64, f64)> {
-            run.course().map(|here| (here.0, of(here))).collect()
-        };
-        let error = run.quiet().along().map(percent).collect();
-        Self { name, error, speed: over(|here| here.1), flow: over(|here| here.2) }
-    }
-}
 
 /// Runs the corner for every time, and tells of the longest.
 pub fn corner(effort: Effort, rows: &mut Rows) -> Result<Section, ReproduceError> {

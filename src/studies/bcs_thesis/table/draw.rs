@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::corner::Around;
+use super::around::Around;
 use crate::report::run::area::{Area, XAxis};
 use crate::report::run::palette;
 use crate::report::run::palette::Ink;
@@ -16,6 +16,15 @@ use crate::studies::bcs_thesis::on_off::{Compared, Run};
 
 /// What is drawn once more, more closely \[s\].
 const CLOSER_S: (f64, f64) = (40.0, 60.0);
+
+/// What a camera some way behind the nozzle brings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraGain {
+    /// Distance behind the nozzle \[mm\].
+    pub behind_mm: f64,
+    /// Area RMSE, off over on.
+    pub ratio: f64,
+}
 
 /// A curve, its name and its colour.
 type Curve<'a> = (&'a [(f64, f64)], &'static str, Ink);
@@ -122,10 +131,15 @@ fn time(run: &Run) -> XAxis {
 }
 
 /// What a camera can do, beside its bound.
-pub fn sensing(found: &[(f64, f64)], bound: &[(f64, f64)]) -> Markup {
-    let range = (0.0, bound.last().map_or(1.0, |(mm, _)| *mm));
+pub fn sensing(found: &[CameraGain], bound: &[CameraGain]) -> Markup {
+    let range = (0.0, bound.last().map_or(1.0, |gain| gain.behind_mm));
+    let points = |gains: &[CameraGain]| -> Vec<(f64, f64)> {
+        gains.iter().map(|gain| (gain.behind_mm, gain.ratio)).collect()
+    };
+    let (found, bound) = (points(found), points(bound));
     let axis = XAxis { title: "camera behind the nozzle [mm]".to_owned(), range, divisor: 1.0 };
-    let curves = [(bound, "bound", palette::LIMIT), (found, "ours", palette::OURS)];
+    let curves =
+        [(bound.as_slice(), "bound", palette::LIMIT), (found.as_slice(), "ours", palette::OURS)];
     plot("area RMSE, off over on", &axis, &curves, None)
 }
 

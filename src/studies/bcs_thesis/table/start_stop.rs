@@ -4,9 +4,12 @@
 
 mod draw;
 
-use crate::sim::start_stop::{IDLE_S, Machine, Score};
+use crate::sim::melt::Machine;
+use crate::studies::bcs_thesis::start_stop::bench::{IDLE_S, Score};
 use crate::studies::bcs_thesis::start_stop::experiment::{FOLLOWS_SHARE, Losses, run, sum};
-use crate::studies::reproduce::{ReproduceError, Rows, Section};
+use crate::studies::error::ReproduceError;
+use crate::studies::row::Rows;
+use crate::studies::study::Section;
 
 const CASES: [&str; 3] = [
     "starts and stops, robot follows",

@@ -8,7 +8,7 @@ use crate::report::run::palette::{DEMAND, FLOW, Ink, OURS, PAPER, SETPOINT, SPEE
 use crate::report::run::pauses::{Drawn, over_pauses};
 use crate::report::run::plot::{Layer, Plot, y_range};
 use crate::report::run::series::series;
-use crate::sim::start_stop::{IDLE_S, Moment, Score};
+use crate::studies::bcs_thesis::start_stop::bench::{IDLE_S, Moment, Score};
 use crate::studies::bcs_thesis::start_stop::experiment::{Found, Losses, WATCHED_IDLE_S, bench};
 
 /// A start is over, and a stop nearly, after this \[s\].

@@ -1,10 +1,11 @@
 //! Figures of a simulated layer.
 
-use super::cell::{Sight, Witness};
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::robot::RobotMode;
 use crate::core::time::Stamp;
+use crate::numeric::average::{mean, rms};
+use crate::sim::cell::{Sight, Witness};
 
 /// A place along the bead and a value there.
 pub type AlongBead = (f64, f64);
@@ -38,7 +39,7 @@ impl Score {
 
     /// Its root mean square \[mm\].
     pub fn rms_error(&self) -> f64 {
-        mean(self.errors().map(|error| error * error)).sqrt()
+        rms(self.errors())
     }
 
     /// Mean of the speed over time, the start included \[mm/s\].
@@ -87,27 +88,9 @@ impl Witness for Score {
     }
 }
 
-/// Mean of some values; not a number of none.
-pub fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, n) = values.fold((0.0, 0.0), |(sum, n), value| (sum + value, n + 1.0));
-    sum / n
-}
-
-/// Median of some values, the mean of the middle two where there are two; not a number
-/// of none.
-pub fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => f64::NAN,
-        n if n % 2 == 1 => values[middle],
-        _ => f64::midpoint(values[middle - 1], values[middle]),
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::trials::score::*;
 
     #[test]
     fn what_was_never_seen_has_no_error() {
@@ -115,12 +98,5 @@ mod tests {
         assert!(score.mean_error().is_nan() && score.rms_error().is_nan());
         score.widths = vec![(100.0, 38.6), (300.0, 41.0), (500.0, 41.6), (700.0, 42.1)];
         assert!((score.mean_error() - (3.4 + 1.0 + 0.4 + 0.1) / 4.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn the_median_of_an_even_number_lies_between_the_middle_two() {
-        assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), 2.5);
-        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
-        assert!(median(&mut []).is_nan());
     }
 }

@@ -1,4 +1,10 @@
-//! The melt between screw and nozzle.
+//! The melt between screw and nozzle of an extruder that is started after pauses and
+//! stopped again: more than the model of [`crate::extruder::start_stop`] knows.
+//!
+//! ```text
+//! command ─dead time─▶ screw ─▶ void (opens in two parts while it stands) ─▶ melt under
+//!                                pressure ─power law─▶ flow, which drifts
+//! ```
 
 use std::collections::VecDeque;
 

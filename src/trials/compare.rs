@@ -3,12 +3,13 @@
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::cell::SimError;
-use super::score::{AlongBead, mean, median};
-use super::trial::Trial;
+use super::layer::Trial;
+use super::score::AlongBead;
 use crate::calibration::Calibration;
 use crate::cell::file::{Cell, RunPart};
 use crate::core::units::Mm;
+use crate::numeric::average::{mean, median};
+use crate::sim::cell::SimError;
 use crate::width_control::target::Target;
 
 /// Way after control began from which errors count \[mm\].
@@ -160,8 +161,8 @@ fn course(trials: &[Trial], target_mm: f64) -> Vec<AlongBead> {
 mod tests {
     use std::path::Path;
 
-    use super::*;
     use crate::cell::file::Purpose;
+    use crate::trials::compare::*;
 
     fn contender(name: &str, text: &str) -> Contender {
         let cell = Cell::parse(Path::new(name), text, Purpose::Run).unwrap();

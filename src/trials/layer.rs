@@ -9,8 +9,9 @@ use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::run::runner::NoRecorder;
 
-use super::cell::{Sight, SimCell, SimError, Witness};
-use super::score::{AlongBead, Score, mean};
+use super::score::{AlongBead, Score};
+use crate::numeric::average::{mean, rms};
+use crate::sim::cell::{Sight, SimCell, SimError, Witness};
 
 /// Places along the bead at which it is judged \[mm\].
 const EVERY_MM: f64 = 0.5;
@@ -38,13 +39,14 @@ impl Trial {
         calibration: &Calibration,
         seed: u64,
     ) -> Result<Self, SimError> {
-        Self::lay_told((cell, run), calibration, 1.0, seed)
+        Self::lay_told(cell, run, calibration, 1.0, seed)
     }
 
     /// The same by a controller that is told the camera's distance wrong by a
     /// factor.
     pub fn lay_told(
-        (cell, run): (&Cell, &RunPart),
+        cell: &Cell,
+        run: &RunPart,
         calibration: &Calibration,
         factor: f64,
         seed: u64,
@@ -93,7 +95,7 @@ impl Trial {
 
     /// Root mean square of the bead's error from a place on \[mm\].
     pub fn rms_error(&self, from_mm: f64) -> f64 {
-        mean(self.errors(from_mm).map(|error| error * error)).sqrt()
+        rms(self.errors(from_mm))
     }
 
     /// Standard deviation of the bead's width from a place on \[mm\].

@@ -1,8 +1,9 @@
-//! Beads with pauses between them, laid by the rules of a strategy.
+//! Beads with pauses between them, laid by the rules of a strategy; what of them is void
+//! or came where none was wanted.
 
-use super::melt::{Machine, Melt};
 use crate::core::time::Span;
 use crate::extruder::start_stop::{Laid, Pause, Timing};
+use crate::sim::melt::{Machine, Melt};
 
 /// How starts and stops are timed.
 pub trait Strategy {
@@ -85,6 +86,8 @@ pub struct Watched {
     pub start: Vec<Moment>,
 }
 
+/// Pauses that starts are judged after \[s\].
+pub const IDLE_S: [f64; 7] = [0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0];
 /// A stop or a start is watched for so long \[s\].
 pub const WATCHED_S: f64 = 4.0;
 

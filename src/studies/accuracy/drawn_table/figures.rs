@@ -1,0 +1,98 @@
+//! What became of a frame, and figures of some frames of a set.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::studies::accuracy::drawn::Parameter;
+
+/// Errors of more standard deviations than this, and of more pixels, are silent.
+const SILENT_SIGMAS: f64 = 5.0;
+const SILENT_PX: f64 = 0.3;
+
+/// What became of one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DrawnOutcome {
+    /// Its number within the set.
+    pub frame: u64,
+    /// What was drawn for it.
+    pub parameters: Vec<Parameter>,
+    /// Error and standard deviation, or why it was refused.
+    pub width: Result<Deviation, Refusal>,
+}
+
+/// How far off a width is \[px\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Deviation {
+    /// Measured less true width.
+    pub error_px: f64,
+    /// As the measurement reports it.
+    pub sigma_px: f64,
+}
+
+impl Deviation {
+    /// Whether it is off by more than its standard deviation excuses.
+    pub fn is_silent(&self) -> bool {
+        self.error_px.abs() > SILENT_PX && self.error_px.abs() > SILENT_SIGMAS * self.sigma_px
+    }
+}
+
+/// Why a frame gave no width.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Refusal {
+    /// The status in `widths.csv`.
+    pub status: &'static str,
+    /// Whether its words name the camera's gamma.
+    pub names_gamma: bool,
+}
+
+/// Figures of some frames of a set.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DrawnFigures {
+    /// The set's name.
+    pub set: &'static str,
+    /// Which of its frames.
+    pub part: Part,
+    /// Their number.
+    pub frames: usize,
+    /// Share that gave a width.
+    pub measured_share: f64,
+    /// Mean error \[px\].
+    pub bias_px: Option<f64>,
+    /// Root of the mean square of the error \[px\].
+    pub rmse_px: Option<f64>,
+    /// Root of the mean square of the error over its standard deviation.
+    pub z: Option<f64>,
+    /// Frames whose width is off by more than 5 standard deviations and 0.3 px.
+    pub silent: usize,
+    /// How many frames were refused, by status.
+    pub refused: BTreeMap<&'static str, usize>,
+    /// How many refusals do not name the camera's gamma.
+    pub without_gamma: usize,
+    /// Frames with the largest errors over sigma.
+    pub worst: Vec<u64>,
+    /// What is missed.
+    pub missed: Vec<String>,
+}
+
+/// Some frames of a set.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Part {
+    /// Every frame.
+    All,
+    /// Those whose value lies within a third, in the logarithm, of its range.
+    Third {
+        /// The parameter's name, with its unit.
+        parameter: &'static str,
+        /// From which value on.
+        from: f64,
+        /// Up to which value.
+        to: f64,
+    },
+    /// Those of which it is 0.
+    Zero {
+        /// The parameter's name, with its unit.
+        parameter: &'static str,
+    },
+}

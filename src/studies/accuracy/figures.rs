@@ -1,0 +1,104 @@
+//! Figures of one set, and those that miss their limit.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// Error and standard deviation of one measured width \[mm\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// Measured less true width.
+    pub error_mm: f64,
+    /// As the measurement believes it.
+    pub sigma_mm: f64,
+}
+
+/// The figures of one set. Without a measured frame most of them are none.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SetFigures {
+    /// The set's name.
+    pub set: &'static str,
+    /// Frames that were rendered.
+    pub frames: usize,
+    /// Mean error \[px\].
+    pub bias_px: Option<f64>,
+    /// Root of the mean square of the error \[px\].
+    pub rmse_px: Option<f64>,
+    /// Smallest standard deviation that is possible where the direction is
+    /// known \[px\].
+    pub bound_px: f64,
+    /// RMSE over that.
+    pub rmse_over_bound: Option<f64>,
+    /// Smallest standard deviation that is possible where the direction is
+    /// found from the same edges \[px\].
+    pub free_bound_px: f64,
+    /// RMSE over that.
+    pub rmse_over_free_bound: Option<f64>,
+    /// Mean error \[mm\].
+    pub bias_mm: Option<f64>,
+    /// Root of the mean square of the error \[mm\].
+    pub rmse_mm: Option<f64>,
+    /// Share of the frames that gave a width.
+    pub measured_share: f64,
+    /// Share of the frames that gave a width more than half a pixel off.
+    pub silent_share: f64,
+    /// Root of the mean square of the error over its standard deviation.
+    pub rms_over_sigma: Option<f64>,
+    /// Share of the widths whose 95 % interval holds the true one.
+    pub within_interval: Option<f64>,
+    /// Whether the set's limits are kept; none where it has none.
+    pub kept: Option<bool>,
+    /// What does not keep its limit.
+    pub missed: Vec<Miss>,
+}
+
+/// A figure that does not keep its limit, as the table shows it: shares are in
+/// percent.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Miss {
+    /// Which figure.
+    pub figure: &'static str,
+    /// What it is; none where nothing was measured.
+    pub value: Option<f64>,
+    /// What it was to be, at least or at most.
+    pub limit: f64,
+}
+
+impl fmt::Display for Miss {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.value {
+            None => write!(f, "{} none", self.figure),
+            Some(value) => {
+                let sign = if value < self.limit { '<' } else { '>' };
+                write!(f, "{} {} {sign} {}", self.figure, short(value), short(self.limit))
+            }
+        }
+    }
+}
+
+/// With four digits that count.
+fn short(value: f64) -> f64 {
+    if value == 0.0 {
+        return value;
+    }
+    let scale = 10_f64.powf(3.0 - value.abs().log10().floor());
+    (value * scale).round() / scale
+}
+
+#[expect(clippy::cast_precision_loss, reason = "no set has 2^53 frames")]
+pub(super) fn share(part: usize, of: usize) -> f64 {
+    part as f64 / of.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_at_any_size() {
+        assert_eq!(
+            [0.0, 1.118_29, 0.005_034_4, 1393.511].map(short),
+            [0.0, 1.118, 0.005_034, 1394.0]
+        );
+    }
+}

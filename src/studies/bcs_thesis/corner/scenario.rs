@@ -1,0 +1,103 @@
+//! The corner, its bead and its drive, and the plan for it.
+
+use crate::extruder::limits::{CommandLimits, LimitError};
+use crate::numeric::lti::{ModelError, TransferFunction};
+use crate::plan::{
+    Bead, Limits, PathLimits, Plan, PlanError, ProfileError, RobotLimits, SpeedProfile, Task,
+    Unmodelled, solve, time_optimal,
+};
+use crate::studies::bcs_thesis::{drive, flow};
+
+/// Path before and after the corner \[mm\]: more than any plan uses.
+const BEFORE_MM: f64 = 300.0;
+const AFTER_MM: f64 = 400.0;
+/// Path on either side of the corner over which the error is judged \[mm\].
+pub const JUDGED_MM: f64 = 100.0;
+/// Share of the change's standard deviation that no model tells, and how long it hangs
+/// together \[s\].
+pub const UNMODELLED: Unmodelled = Unmodelled { share: 0.17, correlation_s: 0.15 };
+/// The bead. Its length is given; a plan that counted on it to the last percent would be of
+/// little use for any other.
+pub const BEAD: Bead = Bead { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_doubt: 0.07 };
+
+/// The corner and what may be done about it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scenario {
+    /// Speed away from the corner \[mm/s\].
+    pub speed_mm_per_s: f64,
+    /// Speed at its apex \[mm/s\].
+    pub apex_mm_per_s: f64,
+    /// Acceleration \[mm/s²\].
+    pub accel_mm_per_s2: f64,
+    /// Smallest and largest drive voltage \[V\].
+    pub voltage: (f64, f64),
+    /// Its fastest change \[V/s\].
+    pub voltage_per_s: f64,
+    /// Commands a second.
+    pub rate_hz: u16,
+}
+
+impl Default for Scenario {
+    /// 100 mm/s, 2 mm/s at the apex, 2 m/s². The drive takes the usual command of 0 V to
+    /// 10 V, of which 100 mm/s take 6.7 V, and changes by all of it in half a second, as
+    /// ramps of drives of this size do; commands at 200 Hz.
+    fn default() -> Self {
+        Self {
+            speed_mm_per_s: 100.0,
+            apex_mm_per_s: 2.0,
+            accel_mm_per_s2: 2000.0,
+            voltage: (0.0, 10.0),
+            voltage_per_s: 20.0,
+            rate_hz: 200,
+        }
+    }
+}
+
+/// What stands in the way of the experiment.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CornerError {
+    /// The robot's speed.
+    #[error("the corner's speed: {0}")]
+    Profile(#[from] ProfileError),
+    /// The plant.
+    #[error("the corner's extruder: {0}")]
+    Model(#[from] ModelError),
+    /// The drive.
+    #[error("the corner's drive: {0}")]
+    Limits(#[from] LimitError),
+    /// The plan.
+    #[error("the corner's plan: {0}")]
+    Plan(#[from] PlanError),
+}
+
+impl Scenario {
+    /// The quickest speed that the path and the acceleration allow.
+    pub fn nominal(&self) -> Result<SpeedProfile, ProfileError> {
+        let mut limits = PathLimits::new(-BEFORE_MM, self.speed_mm_per_s);
+        limits.to(0.0, self.speed_mm_per_s, self.apex_mm_per_s);
+        limits.to(AFTER_MM, self.speed_mm_per_s, self.speed_mm_per_s);
+        time_optimal(&limits, self.accel_mm_per_s2)
+    }
+
+    /// Limits of the drive.
+    pub fn drive(&self) -> Result<CommandLimits, LimitError> {
+        CommandLimits::new(self.voltage.0, self.voltage.1, self.voltage_per_s)
+    }
+
+    /// The extruder from voltage to flow.
+    pub fn extruder() -> Result<TransferFunction, ModelError> {
+        drive()?.series(&flow()?)
+    }
+
+    /// A plan within a time that may be added \[s\].
+    pub fn plan(&self, budget_s: f64, unmodelled: Unmodelled) -> Result<Plan, CornerError> {
+        let robot = RobotLimits {
+            accel_mm_per_s2: self.accel_mm_per_s2,
+            slowest_mm_per_s: self.apex_mm_per_s,
+        };
+        let limits = Limits { robot, drive: self.drive()?, budget_s };
+        let extruder = Self::extruder()?;
+        let task = Task { limits, bead: BEAD, unmodelled, extruder: &extruder };
+        Ok(solve(&task, &self.nominal()?)?)
+    }
+}

@@ -1,0 +1,83 @@
+//! What happens to the extruder in a run, whatever the wheel does: voltage and flow.
+
+use crate::core::time::Stamp;
+use crate::extruder::feedforward::FeedforwardError;
+use crate::numeric::average::mean;
+use crate::numeric::lti::{Between, Simulator};
+use crate::sim::hash::{mix, normal_pair};
+use crate::studies::bcs_thesis::{drive, flow};
+
+/// Step of the plant \[s\].
+pub(super) const STEP_S: f64 = 0.001;
+/// Length of a run \[s\].
+const LENGTH_S: f64 = 90.0;
+/// From when on the section is judged \[s\].
+pub const JUDGED_FROM_S: f64 = 15.0;
+/// Wanted section \[mm²\].
+pub const AREA_MM2: f64 = 45.0;
+/// Speed of the wheel's surface \[mm/s\] for each rpm: a diameter of
+/// 254.762 mm.
+pub const MM_PER_S_PER_RPM: f64 = std::f64::consts::PI * 254.762 / 60.0;
+/// Lag that colours the unmodelled flow \[s\].
+pub const CORRELATION_S: f64 = 0.15;
+/// Share of the flow's standard deviation that the thesis' model leaves:
+/// NRMSE 83 %.
+pub const UNMODELLED_SHARE: f64 = 0.17;
+
+/// What happens to the extruder in a run, whatever the wheel does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Course {
+    pub(super) seed: u64,
+    /// Drive voltage \[V\] at every step.
+    pub(super) voltage: Vec<f64>,
+    /// Flow at the nozzle, modelled and not \[mm³/s\].
+    pub(super) flow: Vec<f64>,
+    /// Its mean over the time that is judged \[mm³/s\].
+    pub(super) mean_flow: f64,
+    /// Standard deviation of the unmodelled part \[mm³/s\].
+    pub(super) unmodelled: f64,
+}
+
+impl Course {
+    /// Of a seed and of the share of the flow's standard deviation that is not
+    /// modelled.
+    pub fn new(seed: u64, unmodelled_share: f64) -> Result<Self, FeedforwardError> {
+        let steps = to_steps(LENGTH_S);
+        let voltage: Vec<f64> = (0_u64..).take(steps).map(|step| voltage(seed, step)).collect();
+        let (mut g1, mut g2) = (
+            Simulator::new(&drive()?, STEP_S, Between::Held)?,
+            Simulator::new(&flow()?, STEP_S, Between::Linear)?,
+        );
+        let start = voltage.first().copied().unwrap_or(0.0);
+        g1.settle(start)?;
+        g2.settle(start * drive()?.dc_gain())?;
+        let mut flow: Vec<f64> = voltage.iter().map(|v| g2.step(g1.step(*v))).collect();
+        let judged = flow.get(to_steps(JUDGED_FROM_S)..).unwrap_or_default();
+        let mean_flow = mean(judged.iter().copied());
+        let spread = mean(judged.iter().map(|q| (q - mean_flow).powi(2))).sqrt();
+        let unmodelled = unmodelled_share * spread;
+        let kept = libm::exp(-STEP_S / CORRELATION_S);
+        let fresh = (1.0 - kept * kept).sqrt();
+        let mut noise = normal_pair(mix(&[seed, 2, 0]))[0];
+        for (step, q) in (1_u64..).zip(&mut flow) {
+            *q += unmodelled * noise;
+            noise = kept * noise + fresh * normal_pair(mix(&[seed, 2, step]))[0];
+        }
+        Ok(Self { seed, voltage, flow, mean_flow, unmodelled })
+    }
+}
+
+fn voltage(seed: u64, step: u64) -> f64 {
+    let (constant, held) = (8000, 1500);
+    let Some(since) = step.checked_sub(constant) else { return 3.0 };
+    3.0 + 0.45 * normal_pair(mix(&[seed, 1, since / held]))[0]
+}
+
+pub(super) fn at(step: u64) -> Stamp {
+    Stamp::from_ns(step * 1_000_000)
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a short time")]
+pub(super) fn to_steps(seconds: f64) -> usize {
+    (seconds / STEP_S).round() as usize
+}

@@ -1,0 +1,57 @@
+//! Rows of a paper's table.
+
+use serde::Serialize;
+
+use super::source::Source;
+
+/// One quantity of one experiment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// The source.
+    pub seed: &'static str,
+    /// The experiment.
+    pub case: String,
+    /// What was measured.
+    pub quantity: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// The published number; none where the paper gives none.
+    pub published: Option<f64>,
+    /// What the paper's own method gives in our simulation; none where it
+    /// never gets there.
+    pub simulated: Option<f64>,
+    /// What this program's best method gives on the same plant; none where
+    /// there is none yet.
+    pub ours: Option<f64>,
+}
+
+/// Rows of one source as they come.
+#[derive(Debug)]
+pub struct Rows {
+    seed: &'static str,
+    rows: Vec<Row>,
+}
+
+impl Rows {
+    /// No rows yet.
+    pub const fn of(source: Source) -> Self {
+        Self { seed: source.name(), rows: Vec::new() }
+    }
+
+    /// Adds a row: the case, then quantity and unit, then what is published,
+    /// what the paper's method gives, and ours.
+    pub fn push(
+        &mut self,
+        case: impl Into<String>,
+        (quantity, unit): (&'static str, &'static str),
+        [published, simulated, ours]: [Option<f64>; 3],
+    ) {
+        let (seed, case) = (self.seed, case.into());
+        self.rows.push(Row { seed, case, quantity, unit, published, simulated, ours });
+    }
+
+    /// The rows.
+    pub fn into_vec(self) -> Vec<Row> {
+        self.rows
+    }
+}
