@@ -36,15 +36,18 @@ mod horizon;
 pub mod job;
 pub mod limits;
 mod long;
+pub mod position;
 pub mod profile;
 mod quadratic;
 mod slope;
 pub mod solve;
 mod step;
+pub mod task;
 #[cfg(test)]
 mod tests;
 
 pub use foretell::{Foretold, Unplanned};
 pub use limits::{PathLimits, attainable, time_optimal};
 pub use profile::{ProfileError, SpeedProfile};
-pub use solve::{Bead, Limits, Plan, PlanError, RobotLimits, Task, Unmodelled, solve};
+pub use solve::{Plan, solve};
+pub use task::{Bead, Limits, PlanError, RobotLimits, Task, Unmodelled};

@@ -15,10 +15,10 @@ use crate::core::units::Rpm;
 use crate::extruder::feedforward::{
     ExtruderModel, FeedforwardError, FlowForecast, InverseSettings, ScrewSpeed, Tracker,
 };
-use crate::extruder::law::{
+use crate::extruder::rheology::DragFlow;
+use crate::extruder::strategy::{
     AdaptiveNozzle, Constant, Foreseen, OperatingPoint, Played, PressureLoop, ScrewFill,
 };
-use crate::extruder::rheology::DragFlow;
 use crate::extruder::{ExtruderSetup, Law};
 use crate::identify::{file as model, profile};
 use crate::io::model_file;

@@ -18,13 +18,13 @@ mod watch;
 
 use std::sync::Arc;
 
-use super::law::{Law, Wish};
 use super::limits::{CommandLimit, CommandLimits};
 use super::rates::Rate;
 use super::readings::{ReadingFilters, Readings};
 use super::report::{ExtruderCommand, ExtruderReport};
 use super::start_stop::Timing;
 use super::state::{ExtruderFault, ExtruderHold, ExtruderState, ExtruderTrace};
+use super::strategy::{Law, Wish};
 use super::trajectory::PlannedJob;
 use super::{Drive, RobotFollows};
 use crate::core::readback::Follow;

@@ -3,7 +3,7 @@
 
 use super::extruder::{Course, TICK_S, float, follow, whole};
 use super::profile::SpeedProfile;
-use super::solve::{AlongPath, PlanError, Task};
+use super::task::{AlongPath, PlanError, Task};
 use crate::core::time::Span;
 use crate::numeric::lti::ModelError;
 

@@ -140,16 +140,12 @@ fn junction(before: &Move, after: &Move, settings: &Settings) -> f64 {
         .clamp(settings.apex_mm_per_s, settings.fastest_mm_per_s.max(settings.apex_mm_per_s))
 }
 
-/// Distance of two places \[mm\].
-pub(super) fn distance(from: [f64; 3], to: [f64; 3]) -> f64 {
-    from.iter().zip(to).map(|(a, b)| (b - a) * (b - a)).sum::<f64>().sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
     use super::*;
+    use crate::plan::position::distance;
 
     const SETTINGS: Settings = Settings {
         start_mm: [0.0; 3],

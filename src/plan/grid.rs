@@ -3,7 +3,7 @@
 
 use super::horizon::Window;
 use super::profile::SpeedProfile;
-use super::solve::Bead;
+use super::task::Bead;
 
 /// A change of the speed of this share of the acceleration is quick.
 const QUICK: f64 = 0.1;

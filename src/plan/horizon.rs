@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use super::extruder::{Course, Extruder, Hats, float, whole};
 use super::profile::SpeedProfile;
 use super::slope::Clock;
-use super::solve::{Bead, Unmodelled};
+use super::task::{Bead, Unmodelled};
 
 /// Time between two looks at the flow, for its standard deviation \[s\].
 const LOOK_S: f64 = 0.02;

@@ -1,5 +1,6 @@
 //! The planned profile of a job from a table: path length, position and nominal speed.
 
+use super::position::{Position, distance};
 use super::profile::{ProfileError, SpeedProfile};
 use crate::document::csv::in_words;
 
@@ -118,7 +119,7 @@ fn check_way(
     (before_mm, from): (f64, [f64; 3]),
     (here_mm, to): (f64, [f64; 3]),
 ) -> Result<(), JobError> {
-    let way_mm = super::gcode::distance(from, to);
+    let way_mm = distance(from, to);
     let path_mm = here_mm - before_mm;
     // A path that does not grow is for the profile to say.
     if path_mm > 0.0 && way_mm > path_mm * (1.0 + ROUNDED.0) + ROUNDED.1 {

@@ -6,8 +6,8 @@ use super::grid::Quick;
 use super::horizon::{Choice, Horizon, Outcome};
 use super::limits::reach;
 use super::profile::SpeedProfile;
-use super::solve::{PlanError, Task};
 use super::step::Bounds;
+use super::task::{PlanError, Task};
 
 /// How far ahead a horizon reaches at the nominal speed \[s\]; beyond a quick change within
 /// it, it goes on for as long as the flow may take to come back.

@@ -6,7 +6,7 @@ use crate::core::time::Span;
 use crate::core::units::Mm2;
 use crate::document::Table;
 use crate::extruder::adaptive::{Adaptation, AdaptiveLaw, Gains, Safety, ScalarPlant};
-use crate::extruder::law::NozzleModel;
+use crate::extruder::strategy::NozzleModel;
 
 const ANY: std::ops::RangeInclusive<f64> = -1e9..=1e9;
 

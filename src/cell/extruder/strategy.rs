@@ -9,9 +9,9 @@ use crate::document::Table;
 use crate::extruder::Drive;
 use crate::extruder::adaptive::AdaptiveLaw;
 use crate::extruder::feedforward::{RightZeros, ScrewSpeed};
-use crate::extruder::law::{NozzleModel, PressureSettings};
 use crate::extruder::rheology::DragFlow;
 use crate::extruder::screw::control::ScrewSettings;
+use crate::extruder::strategy::{NozzleModel, PressureSettings};
 use crate::identify::library::{TOLERANCE_C, Wanted};
 
 /// How commands are found.

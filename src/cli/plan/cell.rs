@@ -8,7 +8,7 @@ use crate::cell::file::{ExtruderPart, Purpose, RunPart};
 use crate::cli::WrongArguments;
 use crate::extruder::CommandLimits;
 use crate::extruder::demand::section;
-use crate::extruder::law::OperatingPoint;
+use crate::extruder::strategy::OperatingPoint;
 use crate::identify::file as model;
 use crate::io::record::ExtruderFile;
 use crate::numeric::lti::TransferFunction;

@@ -4,8 +4,8 @@
 use super::error::{ScrewError, positive};
 use super::euler::{Euler, whole};
 use super::exact::{Exact, Overtaken, Prediction};
+use super::feedback::FillLaw;
 use super::history::FeedHistory;
-use super::law::FillLaw;
 use super::model::{Conveying, Screw};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;

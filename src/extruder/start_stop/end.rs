@@ -1,6 +1,6 @@
 //! The end of a bead.
 
-use super::Laid;
+use super::laid::Laid;
 use crate::core::time::Span;
 use crate::core::units::Mm;
 use crate::identify::start_stop::parameters::StartStop;

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::core::time::Span;
+use crate::core::units::{Mm3PerS, MmPerS};
 
 const MACHINE: StartStop = StartStop {
     first_flow_s: 0.2,

@@ -1,8 +1,9 @@
 //! What a line means after the lines before it.
 
-use super::arc::{Centre, Move};
+use super::arc::{ArcEnds, Centre, Move};
+use super::error::GcodeError;
 use super::words::Word;
-use super::{GcodeError, distance};
+use crate::plan::position::distance;
 
 /// Codes that change nothing about the path: the plane XY, no compensation, a work
 /// offset, exact and continuous paths, no cycle, feeds a minute.
@@ -128,7 +129,7 @@ impl State {
             Mode::Line => Move::Line { from, to },
             Mode::Left | Mode::Right => {
                 let centre = self.centre(line, asked)?;
-                Move::arc(line, (from, to), centre, mode == Mode::Left)?
+                Move::arc(line, ArcEnds { from, to }, centre, mode == Mode::Left)?
             }
         };
         Ok(Motion::Laid(moved, self.feed.ok_or(GcodeError::NoFeed { line })?))

@@ -1,6 +1,6 @@
 //! A line of G-code as words.
 
-use super::GcodeError;
+use super::error::GcodeError;
 
 /// A letter, in capitals, and its number.
 pub type Word = (char, f64);

@@ -3,7 +3,7 @@
 //! Mohammadi Looey et al. 2026, eq. (8); the strand's sub-system commands the
 //! plate, which is the robot's side.
 
-use super::{Need, Strategy, Unusable, Wish};
+use super::interface::{Need, Strategy, Unusable, Wish};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm2, Mm3PerS};
 use crate::extruder::adaptive::{AdaptiveLaw, ScalarPlant};

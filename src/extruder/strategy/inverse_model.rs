@@ -1,7 +1,7 @@
 //! The inverse of a model behind the face of a strategy: the wanted flow
 //! becomes the command that gives it. bcs-thesis, chapter 4.
 
-use super::{Need, Strategy, Unusable, Wish};
+use super::interface::{Need, Strategy, Unusable, Wish};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm3PerS, Rpm};
 use crate::extruder::feedforward::{FlowForecast, ScrewSpeed, Tracker};

@@ -1,22 +1,10 @@
-//! The strategies of the extruder side behind one face: what is wanted of the
-//! nozzle and what the extruder reports go in, a command comes out.
+//! What every strategy of the extruder side can do: what is wanted of the nozzle and what
+//! the extruder reports go in, a command comes out.
 
-mod adaptive;
-mod feedforward;
-mod played;
-mod pressure;
-mod screw;
-
-pub use adaptive::{AdaptiveNozzle, NozzleModel};
-pub use feedforward::{Foreseen, OperatingPoint};
-pub use played::{Constant, Played};
-pub use pressure::{PressureChoice, PressureLoop, PressureSettings};
-pub use screw::ScrewFill;
-
-use super::limits::CommandLimit;
-use super::report::ExtruderReport;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm3PerS;
+use crate::extruder::limits::CommandLimit;
+use crate::extruder::report::ExtruderReport;
 
 /// A reading that a law cannot do without.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -131,49 +119,3 @@ pub trait Strategy {
     /// limit.
     fn settle(&mut self, now: Stamp, applied: f64);
 }
-
-/// A strategy with its memory.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Law {
-    /// One command for as long as bead is laid.
-    Constant(Constant),
-    /// Commands that were written down beforehand, for an experiment.
-    Profile(Played),
-    /// The inverse of a model.
-    Feedforward(Box<Foreseen>),
-    /// The pressure at the nozzle.
-    Pressure(Box<PressureLoop>),
-    /// The filled length of a screw, foretold over its delay.
-    Screw(ScrewFill),
-    /// Model-reference adaptive control of the speed in the nozzle.
-    Adaptive(AdaptiveNozzle),
-}
-
-impl Law {
-    /// The law behind the name.
-    pub fn strategy(&self) -> &dyn Strategy {
-        match self {
-            Self::Constant(law) => law,
-            Self::Profile(law) => law,
-            Self::Feedforward(law) => law.as_ref(),
-            Self::Pressure(law) => law.as_ref(),
-            Self::Screw(law) => law,
-            Self::Adaptive(law) => law,
-        }
-    }
-
-    /// The same, to be stepped.
-    pub fn strategy_mut(&mut self) -> &mut dyn Strategy {
-        match self {
-            Self::Constant(law) => law,
-            Self::Profile(law) => law,
-            Self::Feedforward(law) => law.as_mut(),
-            Self::Pressure(law) => law.as_mut(),
-            Self::Screw(law) => law,
-            Self::Adaptive(law) => law,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests;

@@ -1,7 +1,7 @@
 //! Commands that answer nothing: one for all of a bead, or a profile that was
 //! written down beforehand.
 
-use super::{Strategy, Unusable, Wish};
+use super::interface::{Strategy, Unusable, Wish};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm3PerS;
 use crate::extruder::report::ExtruderReport;

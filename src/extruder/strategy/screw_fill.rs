@@ -2,7 +2,7 @@
 //! is brought to its setpoint and held there by what is fed. Diagne et al.
 //! 2015, eq. (74).
 
-use super::{Need, Strategy, Unusable, Wish};
+use super::interface::{Need, Strategy, Unusable, Wish};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm3PerS;
 use crate::extruder::report::ExtruderReport;

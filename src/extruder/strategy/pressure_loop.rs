@@ -2,7 +2,7 @@
 //! pressure by the nozzle's power law, and the screw is told the speed that
 //! holds it. Ma et al. 2026.
 
-use super::{Need, Strategy, Unusable, Wish};
+use super::interface::{Need, Strategy, Unusable, Wish};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{MPa, Mm3PerS, Rpm};
 use crate::extruder::limits::{CommandLimit, CommandLimits};

@@ -1,7 +1,8 @@
 //! Laws under the supervisor, against plants.
 
 use super::*;
-use crate::core::units::{MPa, Mm, Mm2, Rpm};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{MPa, Mm, Mm2, Mm3PerS, Rpm};
 use crate::extruder::adaptive::{Adaptation, AdaptiveLaw, Gains, Safety, ScalarPlant};
 use crate::extruder::feedforward::{InverseSettings, RightZeros, Tracker};
 use crate::extruder::limits::CommandLimits;
@@ -10,9 +11,10 @@ use crate::extruder::pressure::pi::PiGains;
 use crate::extruder::pressure::tuning::Tuning;
 use crate::extruder::pressure::vsfc::VsfcGains;
 use crate::extruder::pressure::{Fopdt, Running};
+use crate::extruder::report::ExtruderReport;
 use crate::extruder::rheology::PowerLaw;
 use crate::extruder::screw::control::{Scheme, ScrewSettings};
-use crate::extruder::screw::law::Setpoint;
+use crate::extruder::screw::feedback::Setpoint;
 use crate::extruder::screw::{FillLaw, PiecewiseExponential, Pulsation, ScrewDesign};
 use crate::extruder::{
     Drive, ExtruderHold, ExtruderSetup, ExtruderState, Laying, PumpMode, Supervisor,

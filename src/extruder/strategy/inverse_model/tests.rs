@@ -2,7 +2,7 @@ use super::*;
 use crate::core::units::Rpm;
 use crate::extruder::CommandLimits;
 use crate::extruder::feedforward::{ExtruderModel, InverseSettings, RightZeros, ScrewSpeed};
-use crate::extruder::law::tests::report;
+use crate::extruder::strategy::tests::report;
 use crate::numeric::lti::{Between, Simulator, TransferFunction};
 
 const PERIOD: Span = Span::from_millis(5);
