@@ -39,6 +39,7 @@ mod long;
 pub mod position;
 pub mod profile;
 mod quadratic;
+mod segment;
 mod slope;
 pub mod solve;
 mod step;
@@ -48,6 +49,6 @@ mod tests;
 
 pub use foretell::{Foretold, Unplanned};
 pub use limits::{PathLimits, attainable, time_optimal};
-pub use profile::{ProfileError, SpeedProfile};
+pub use profile::{ProfileError, SpeedPoint, SpeedProfile};
 pub use solve::{Plan, solve};
 pub use task::{Bead, Limits, PlanError, RobotLimits, Task, Unmodelled};

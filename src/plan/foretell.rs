@@ -88,6 +88,7 @@ mod tests {
     use super::*;
     use crate::extruder::limits::CommandLimits;
     use crate::numeric::lti::TransferFunction;
+    use crate::plan::profile::profile_of;
     use crate::plan::{Bead, Limits, RobotLimits, Unmodelled};
 
     #[test]
@@ -103,7 +104,7 @@ mod tests {
             unmodelled: Unmodelled { share: 0.17, correlation_s: 0.15 },
             extruder: &extruder,
         };
-        let speed = SpeedProfile::new(&[(0.0, 100.0), (60.0, 100.0), (61.0, 50.0), (200.0, 50.0)]);
+        let speed = profile_of(&[(0.0, 100.0), (60.0, 100.0), (61.0, 50.0), (200.0, 50.0)]);
         let speed = speed.unwrap();
         let constant = Foretold::unplanned(&task, &speed, Unplanned::Constant).unwrap();
         let (first, last) = (constant.width[0].1, constant.width.last().unwrap().1);

@@ -5,7 +5,8 @@ use super::extruder::{Extruder, Hats, KNOT_S, float, whole};
 use super::grid::Quick;
 use super::horizon::{Choice, Horizon, Outcome};
 use super::limits::reach;
-use super::profile::SpeedProfile;
+use super::profile::{Node, SpeedProfile};
+use super::segment::Segment;
 use super::step::Bounds;
 use super::task::{PlanError, Task};
 
@@ -29,11 +30,22 @@ pub struct Long<'a> {
     /// Places at which the nominal speed turns upwards \[mm\], which may take time each.
     slow: Vec<f64>,
     extruder: Extruder,
-    /// Places and squares of the speed that are decided.
-    nodes: Vec<(f64, f64)>,
+    /// Nodes that are decided.
+    nodes: Vec<Node>,
     /// When each is passed \[s\].
     times: Vec<f64>,
     knots: Vec<f64>,
+}
+
+/// What of a horizon is to be decided.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Open {
+    /// When its first node is passed \[s\].
+    from_s: f64,
+    /// Nodes that were decided before.
+    decided: usize,
+    /// To where it is decided \[mm\].
+    until_mm: f64,
 }
 
 impl<'a> Long<'a> {
@@ -43,14 +55,14 @@ impl<'a> Long<'a> {
         nominal: &'a SpeedProfile,
         start: f64,
     ) -> Result<Self, PlanError> {
-        let first = nominal.path().iter().copied().zip(nominal.squares().iter().copied()).next();
+        let first = nominal.path().first().zip(nominal.squares().first());
         Ok(Self {
             task,
             nominal,
             quick: Quick::of(nominal, task.limits.robot.accel_mm_per_s2),
             slow: slow_places(nominal),
             extruder: Extruder::settled(task.extruder, start)?,
-            nodes: first.into_iter().collect(),
+            nodes: first.map(|(s, b)| Node { path_mm: *s, square: *b }).into_iter().collect(),
             times: vec![0.0],
             knots: Vec::new(),
         })
@@ -72,7 +84,7 @@ impl<'a> Long<'a> {
     }
 
     fn here(&self) -> f64 {
-        self.nodes.last().map_or(self.nominal.start_mm(), |(s, _)| *s)
+        self.nodes.last().map_or(self.nominal.start_mm(), |node| node.path_mm)
     }
 
     /// The place that the nominal speed reaches after a time \[mm\].
@@ -86,8 +98,8 @@ impl<'a> Long<'a> {
 
     fn horizon_end(&self, here: f64) -> f64 {
         let to = self.later(here, AHEAD_S);
-        let quick = self.quick.within(here, to).last();
-        let to = quick.map_or(to, |(_, end)| to.max(self.later(end, BACK_S)));
+        let quick = self.quick.within(Segment { from_mm: here, to_mm: to }).last();
+        let to = quick.map_or(to, |quick| to.max(self.later(quick.to_mm, BACK_S)));
         // A rest shorter than that is planned at once.
         if self.later(to, AHEAD_S - LEAD_S) >= self.nominal.end_mm() {
             self.nominal.end_mm()
@@ -99,8 +111,8 @@ impl<'a> Long<'a> {
     /// Where the next horizon begins: as far from all quick changes as can be.
     fn commit_place(&self, here: f64, to: f64) -> f64 {
         let first = self.later(here, AHEAD_S - LEAD_S);
-        let unseen = self.quick.within(to, f64::INFINITY).next();
-        let unseen = unseen.map_or(to, |(start, _)| self.later(start, -LEAD_S));
+        let unseen = self.quick.within(Segment { from_mm: to, to_mm: f64::INFINITY }).next();
+        let unseen = unseen.map_or(to, |quick| self.later(quick.from_mm, -LEAD_S));
         let last = self.later(to, -TAIL_S).min(unseen).max(first);
         let places = (0..=50).map(|k| first + (last - first) * f64::from(k) / 50.0);
         let far = places.map(|at| (at, self.quick.distance(at)));
@@ -111,12 +123,16 @@ impl<'a> Long<'a> {
     fn horizon(&mut self, to: f64, until: f64) -> Result<(), PlanError> {
         let here = self.here();
         let back = here - self.task.bead.nozzle_mm - 1e-9;
-        let kept = self.nodes.partition_point(|(s, _)| *s < back).saturating_sub(1);
+        let kept = self.nodes.partition_point(|node| node.path_mm < back).saturating_sub(1);
         let from_s = self.times.get(kept).copied().unwrap_or(0.0);
-        let mut path: Vec<f64> = self.nodes.iter().skip(kept).map(|(s, _)| *s).collect();
-        let mut squares: Vec<f64> = self.nodes.iter().skip(kept).map(|(_, b)| *b).collect();
+        let mut path: Vec<f64> = self.nodes.iter().skip(kept).map(|node| node.path_mm).collect();
+        let mut squares: Vec<f64> = self.nodes.iter().skip(kept).map(|node| node.square).collect();
         let decided = path.len();
-        let ahead = self.quick.nodes(self.nominal, (here, to), self.task.bead.nozzle_mm);
+        let ahead = self.quick.nodes(
+            self.nominal,
+            Segment { from_mm: here, to_mm: to },
+            self.task.bead.nozzle_mm,
+        );
         path.extend(ahead.iter().skip(1));
         squares.extend(ahead.iter().skip(1).map(|s| self.nominal.square_at(*s)));
         let bounds = self.bounds(&path, squares, decided, from_s, to);
@@ -124,7 +140,7 @@ impl<'a> Long<'a> {
         let hats = Hats::new(self.task.extruder, count)?;
         let first =
             Choice { squares: bounds.ceiling.clone(), knots: vec![self.extruder.command(); count] };
-        let span = (path.first().copied().unwrap_or(here), to);
+        let span = Segment { from_mm: path.first().copied().unwrap_or(here), to_mm: to };
         let (min, max) = self.task.limits.drive.range();
         let horizon = Horizon {
             bead: self.task.bead,
@@ -139,7 +155,7 @@ impl<'a> Long<'a> {
         };
         let found = descend(&horizon, &bounds, first);
         if let Some((choice, outcome)) = found {
-            self.decide(&choice, &outcome, (from_s, decided, until));
+            self.decide(&choice, &outcome, Open { from_s, decided, until_mm: until });
         }
         Ok(())
     }
@@ -168,17 +184,14 @@ impl<'a> Long<'a> {
         Bounds { floor, ceiling, accel, drive: limits.drive, longest_s }
     }
 
-    fn decide(
-        &mut self,
-        choice: &Choice,
-        outcome: &Outcome,
-        (from_s, decided, until): (f64, usize, f64),
-    ) {
+    /// Keeps what is planned up to where the next horizon begins.
+    fn decide(&mut self, choice: &Choice, outcome: &Outcome, open: Open) {
+        let Open { from_s, decided, until_mm } = open;
         let nodes = outcome.profile.path().iter().zip(&choice.squares).zip(outcome.profile.times());
         for ((s, b), time) in nodes.skip(decided) {
-            self.nodes.push((*s, *b));
+            self.nodes.push(Node { path_mm: *s, square: *b });
             self.times.push(from_s + time);
-            if *s >= until {
+            if *s >= until_mm {
                 break;
             }
         }
@@ -189,7 +202,7 @@ impl<'a> Long<'a> {
         let knots: Vec<f64> = choice.knots.iter().copied().take(whole(count)).collect();
         self.extruder.advance(&knots);
         let back = self.here() - 2.0 * self.task.bead.nozzle_mm;
-        let kept = self.nodes.partition_point(|(s, _)| *s < back).saturating_sub(1);
+        let kept = self.nodes.partition_point(|node| node.path_mm < back).saturating_sub(1);
         self.extruder.forget(self.times.get(kept).copied().unwrap_or(0.0));
         self.knots.extend(knots);
     }

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::extruder::KNOT_S;
 use super::horizon::{Choice, Horizon, Outcome};
-use super::quadratic::{Rows, least};
+use super::quadratic::{Quadratic, Rows, Term, least};
 use super::slope::Clock;
 use crate::extruder::limits::CommandLimits;
 
@@ -88,8 +88,8 @@ impl<'a> Round<'a> {
             let now = self.choice.squares[node];
             let up = (self.bounds.ceiling[node] / now - 1.0).min(reach);
             let down = (1.0 - self.bounds.floor[node] / now).min(reach);
-            self.rows.at_most([(column, 1.0)], up.max(0.0));
-            self.rows.at_most([(column, -1.0)], down.max(0.0));
+            self.rows.at_most([Term { column, value: 1.0 }], up.max(0.0));
+            self.rows.at_most([Term { column, value: -1.0 }], down.max(0.0));
         }
     }
 
@@ -99,15 +99,15 @@ impl<'a> Round<'a> {
             let most = 2.0 * self.bounds.accel * (path[node] - path[node - 1]);
             let rise = (squares[node] - squares[node - 1]) / most;
             let ends = [(node, 1.0), (node - 1, -1.0)];
-            let terms: Vec<(usize, f64)> = ends
-                .iter()
-                .filter_map(|(end, sign)| Some((self.columns[*end]?, sign * squares[*end] / most)))
-                .collect();
+            let term = |(end, sign): &(usize, f64)| {
+                Some(Term { column: self.columns[*end]?, value: sign * squares[*end] / most })
+            };
+            let terms: Vec<Term> = ends.iter().filter_map(term).collect();
             if terms.is_empty() {
                 continue;
             }
             for sign in [1.0, -1.0] {
-                let terms = terms.iter().map(|(column, value)| (*column, sign * value));
+                let terms = terms.iter().map(|term| Term { value: sign * term.value, ..*term });
                 self.rows.at_most(terms, (1.0 - sign * rise).max(0.0));
             }
         }
@@ -120,12 +120,12 @@ impl<'a> Round<'a> {
         let first = self.places.len() - self.choice.knots.len();
         let mut before = self.horizon.extruder.command();
         for (column, now) in (first..).zip(&self.choice.knots) {
-            self.rows.at_most([(column, 1.0)], (max - now) / span);
-            self.rows.at_most([(column, -1.0)], (now - min) / span);
+            self.rows.at_most([Term { column, value: 1.0 }], (max - now) / span);
+            self.rows.at_most([Term { column, value: -1.0 }], (now - min) / span);
             let rise = (now - before) / span;
             for sign in [1.0, -1.0] {
-                let last = (column > first).then(|| (column - 1, -sign));
-                let terms = [(column, sign)].into_iter().chain(last);
+                let last = (column > first).then(|| Term { column: column - 1, value: -sign });
+                let terms = [Term { column, value: sign }].into_iter().chain(last);
                 self.rows.at_most(terms, (most - sign * rise).max(0.0));
             }
             before = *now;
@@ -135,13 +135,14 @@ impl<'a> Round<'a> {
     fn keep_time(&mut self, outcome: &Outcome) {
         let slope = Clock::new(&outcome.profile).to_end();
         let left = self.bounds.longest_s - outcome.profile.duration_s();
+        let value = |column: usize, node: usize| slope[node] * self.scale[column];
         let terms: Vec<_> =
-            self.free().map(|(column, node)| (column, slope[node] * self.scale[column])).collect();
+            self.free().map(|(column, node)| Term { column, value: value(column, node) }).collect();
         self.rows.at_most(terms, left.max(0.0));
     }
 
     fn solve(self, outcome: &Outcome) -> Option<Choice> {
-        let (hessian, gradient) = self.horizon.model(self.choice, outcome);
+        let Quadratic { hessian, gradient } = self.horizon.model(self.choice, outcome);
         let (places, scale) = (&self.places, &self.scale);
         let size = 1.0 / outcome.cost.max(f64::MIN_POSITIVE);
         let p = DMatrix::from_fn(places.len(), places.len(), |i, j| {
@@ -150,7 +151,7 @@ impl<'a> Round<'a> {
         });
         let scaled = places.iter().zip(scale).map(|(place, scale)| gradient[*place] * scale * size);
         let q = DVector::from_iterator(places.len(), scaled);
-        let x = least(&p, &q, self.rows)?;
+        let x = least(&Quadratic { hessian: p, gradient: q }, self.rows)?;
         let nodes = self.choice.squares.len();
         let mut all = vec![0.0; nodes + self.choice.knots.len()];
         for ((place, scale), share) in places.iter().zip(scale).zip(x.iter()) {
