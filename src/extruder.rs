@@ -25,7 +25,7 @@ pub mod strategy;
 pub mod supervisor;
 pub mod trajectory;
 
-pub use demand::{FlowDemand, Follows, RobotFollows};
+pub use demand::{FlowDemand, Follows, RobotFollows, RobotSpeed};
 pub use drive::Drive;
 pub use limits::{CommandLimit, CommandLimits};
 pub use readings::ReadingFilters;

@@ -28,27 +28,27 @@
 //!    decided before it.
 
 mod descent;
-mod extruder;
-pub mod foretell;
+mod flow;
 pub mod gcode;
 mod grid;
 mod horizon;
 pub mod job;
 pub mod limits;
-mod long;
 pub mod position;
+pub mod prediction;
 pub mod profile;
 mod quadratic;
+mod receding_horizon;
 mod segment;
-mod slope;
 pub mod solve;
-mod step;
+mod subproblem;
 pub mod task;
 #[cfg(test)]
 mod tests;
+mod time_gradient;
 
-pub use foretell::{Foretold, Unplanned};
 pub use limits::{PathLimits, attainable, time_optimal};
+pub use prediction::{Foretold, Unplanned};
 pub use profile::{ProfileError, SpeedPoint, SpeedProfile};
 pub use solve::{Plan, solve};
 pub use task::{Bead, Limits, PlanError, RobotLimits, Task, Unmodelled};

@@ -6,6 +6,7 @@ use crate::core::readback::ROBOT_LAG;
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS};
 use crate::width_control::distance::Distrust;
+use crate::width_control::target::BeadSegment;
 
 impl Controller {
     /// Begins to track as soon as the first stretch is over and the law knows
@@ -44,7 +45,7 @@ impl Controller {
         let (from, lasts) = (now + ROBOT_LAG, self.setup.setpoint_period);
         let state = self.robot?;
         let path = self.nozzle(now)? + state.speed_mm_per_s * ROBOT_LAG;
-        let stretch = (path, path + state.speed_mm_per_s * lasts);
+        let stretch = BeadSegment { from: path, to: path + state.speed_mm_per_s * lasts };
         law.speed(self.setup.control.target.over(state.z_mm, stretch), from, lasts)
     }
 

@@ -8,7 +8,7 @@ use super::step::ExtruderStep;
 use super::{Controller, Phase, Stretch};
 use crate::core::time::Stamp;
 use crate::extruder::trajectory::{Planned, PlannedJob};
-use crate::extruder::{ExtruderFault, ExtruderState, FlowDemand, Laying, Supervisor};
+use crate::extruder::{ExtruderFault, ExtruderState, FlowDemand, Laying, RobotSpeed, Supervisor};
 
 /// The extruder side of a controller, where a cell has one.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,7 +77,8 @@ impl Controller {
                 // the speed that comes. Nor does it follow a robot that goes by its flow.
                 let goes_ahead = self.stretch == Stretch::RunUp || supervisor.is_passing();
                 let robot = self.robot.filter(|_| !goes_ahead);
-                let robot = robot.map(|robot| (told, robot.speed_mm_per_s));
+                let robot =
+                    robot.map(|robot| RobotSpeed { setpoint: told, actual: robot.speed_mm_per_s });
                 let flow = planned.map_or_else(|| demand.wanted(robot), |planned| planned.flow);
                 let way = supervisor.way_of_stop(told);
                 let stops = self.stretch == Stretch::Ending

@@ -6,6 +6,7 @@ use super::{Controller, Phase, Steering};
 use crate::core::readback::Verdict;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;
+use crate::width_control::distance::MeasuredWidth;
 use crate::width_control::limiter::Limit;
 use crate::width_control::pi::{Demand, Pi, Saturation};
 
@@ -71,7 +72,7 @@ impl Controller {
             && trace.bead_expected
         {
             let wanted = trace.error_mm.map_or(width, |error| width - error);
-            trace.distance = Some(law.measured(path, (width, sigma), wanted));
+            trace.distance = Some(law.measured(path, MeasuredWidth { width, sigma }, wanted));
             self.distrust();
         }
     }

@@ -13,8 +13,8 @@ pub mod error;
 pub mod euler;
 pub mod exact;
 pub mod feasible;
+pub mod feed_history;
 pub mod feedback;
-pub mod history;
 pub mod model;
 
 pub use control::{ScrewControl, ScrewFault, ScrewStep};

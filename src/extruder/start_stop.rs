@@ -19,13 +19,13 @@
 //! its speed follows the flow between m and 1, and starts and ends at m/2; m = 1
 //! is the robot that keeps its speed.
 
-mod begin;
-mod end;
-mod laid;
+mod conditions;
+mod start;
+mod stop;
 
-pub use begin::{Pause, Start};
-pub use end::Stop;
-pub use laid::Laid;
+pub use conditions::Laid;
+pub use start::{Pause, Start};
+pub use stop::Stop;
 
 use crate::identify::start_stop::parameters::{StartStop, StartStopError};
 

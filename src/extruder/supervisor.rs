@@ -13,7 +13,7 @@
 //!   the pump runs on all the same, not before it says that it stops.
 
 mod bead;
-mod pause;
+mod sequencer;
 mod watch;
 
 use std::sync::Arc;
@@ -30,7 +30,7 @@ use super::{Drive, RobotFollows};
 use crate::core::readback::Follow;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{MPa, Mm, Mm3PerS, MmPerS};
-use pause::{Pauses, Shares};
+use sequencer::{Pauses, Shares};
 
 /// Most by which a robot that follows the flow is quickened.
 const MOST_SHARE: f64 = 1.5;

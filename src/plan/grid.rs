@@ -3,7 +3,7 @@
 
 use super::horizon::Window;
 use super::profile::SpeedProfile;
-use super::segment::Segment;
+use super::segment::PathSegment;
 use super::task::Bead;
 
 /// A change of the speed of this share of the acceleration is quick.
@@ -49,20 +49,20 @@ impl Spacing {
 
 /// Stretches of path in which the nominal speed changes quickly \[mm\].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Quick(Vec<Segment>);
+pub struct Quick(Vec<PathSegment>);
 
 impl Quick {
     /// Of a profile and the robot's acceleration \[mm/s²\].
     pub fn of(profile: &SpeedProfile, accel: f64) -> Self {
         let nodes = || profile.path().iter().zip(profile.squares());
-        let mut all: Vec<Segment> = Vec::new();
+        let mut all: Vec<PathSegment> = Vec::new();
         for ((s0, b0), (s1, b1)) in nodes().zip(nodes().skip(1)) {
             if (b1 - b0).abs() < QUICK * 2.0 * accel * (s1 - s0) {
                 continue;
             }
             match all.last_mut() {
                 Some(last) if last.to_mm >= *s0 => last.to_mm = *s1,
-                _ => all.push(Segment { from_mm: *s0, to_mm: *s1 }),
+                _ => all.push(PathSegment { from_mm: *s0, to_mm: *s1 }),
             }
         }
         Self(all)
@@ -78,8 +78,8 @@ impl Quick {
     }
 
     /// Those that begin within a stretch \[mm\].
-    pub fn within(&self, stretch: Segment) -> impl Iterator<Item = Segment> + '_ {
-        let Segment { from_mm, to_mm } = stretch;
+    pub fn within(&self, stretch: PathSegment) -> impl Iterator<Item = PathSegment> + '_ {
+        let PathSegment { from_mm, to_mm } = stretch;
         self.0
             .iter()
             .copied()
@@ -89,11 +89,11 @@ impl Quick {
     /// The parts of a stretch over which the flow's change is taken: from before the first
     /// to after the last, narrowly and widely \[mm\]. What is changed only outside the
     /// one shows in the other.
-    pub fn about(&self, stretch: Segment, nozzle_mm: f64) -> [Segment; 2] {
+    pub fn about(&self, stretch: PathSegment, nozzle_mm: f64) -> [PathSegment; 2] {
         let mut inside = self.within(stretch);
         let Some(first) = inside.next() else { return [stretch; 2] };
         let last = inside.last().unwrap_or(first);
-        CHANGED.map(|(before, after)| Segment {
+        CHANGED.map(|(before, after)| PathSegment {
             from_mm: stretch.from_mm.max(first.from_mm - before * nozzle_mm),
             to_mm: stretch.to_mm.min(last.to_mm + after * nozzle_mm),
         })
@@ -101,9 +101,9 @@ impl Quick {
 
     /// Places from one to another, both included, as far apart as the distance from here
     /// says.
-    fn places(&self, stretch: Segment, unit: f64, spacings: &[Spacing]) -> Vec<f64> {
+    fn places(&self, stretch: PathSegment, unit: f64, spacings: &[Spacing]) -> Vec<f64> {
         let mut all = Vec::new();
-        let Segment { from_mm: mut at, to_mm: to } = stretch;
+        let PathSegment { from_mm: mut at, to_mm: to } = stretch;
         while at < to {
             all.push(at);
             // The finest step that is not left before it ends.
@@ -123,7 +123,7 @@ impl Quick {
     /// Nodes of the speed from one place to another \[mm\]. Those of the nominal speed are
     /// among them, so that a straight line between two nodes lies nowhere above it and the
     /// nominal speed itself can be planned.
-    pub fn nodes(&self, nominal: &SpeedProfile, span: Segment, nozzle_mm: f64) -> Vec<f64> {
+    pub fn nodes(&self, nominal: &SpeedProfile, span: PathSegment, nozzle_mm: f64) -> Vec<f64> {
         let turns = turns(nominal, span);
         let mut unit = nozzle_mm;
         loop {
@@ -138,7 +138,7 @@ impl Quick {
     }
 
     /// Where the width is judged, over pieces that lie within a stretch \[mm\].
-    pub fn windows(&self, stretch: Segment, bead: &Bead) -> Vec<Window> {
+    pub fn windows(&self, stretch: PathSegment, bead: &Bead) -> Vec<Window> {
         let mut all = Vec::new();
         let nozzle_mm = bead.nozzle_mm;
         let fine = FINE_LENGTH * nozzle_mm;
@@ -147,7 +147,7 @@ impl Quick {
         let whole =
             lengths.map(|(length_mm, weight)| (length_mm, weight, &PLACES, f64::NEG_INFINITY));
         for (length_mm, weight, steps, beyond) in whole.chain([fine]) {
-            let inside = Segment {
+            let inside = PathSegment {
                 from_mm: stretch.from_mm + 0.5 * length_mm,
                 to_mm: stretch.to_mm - 0.5 * length_mm,
             };
@@ -182,7 +182,7 @@ fn lengths(bead: &Bead) -> Vec<(f64, f64)> {
 }
 
 /// Places within a stretch at which a profile's acceleration changes \[mm\].
-fn turns(profile: &SpeedProfile, stretch: Segment) -> Vec<f64> {
+fn turns(profile: &SpeedProfile, stretch: PathSegment) -> Vec<f64> {
     let nodes = || profile.path().iter().zip(profile.squares());
     let slope = |a: (&f64, &f64), b: (&f64, &f64)| (b.1 - a.1) / (b.0 - a.0);
     nodes()
@@ -213,7 +213,7 @@ mod tests {
     use super::*;
     use crate::plan::profile::profile_of;
 
-    const STRETCH: Segment = Segment { from_mm: -200.0, to_mm: 250.0 };
+    const STRETCH: PathSegment = PathSegment { from_mm: -200.0, to_mm: 250.0 };
 
     fn corner() -> SpeedProfile {
         let top = 100.0;
@@ -224,7 +224,7 @@ mod tests {
     fn a_corner_is_one_quick_stretch_with_its_apex_among_the_nodes() {
         let profile = corner();
         let quick = Quick::of(&profile, 2000.0);
-        assert_eq!(quick, Quick(vec![Segment { from_mm: -2.499, to_mm: 2.499 }]));
+        assert_eq!(quick, Quick(vec![PathSegment { from_mm: -2.499, to_mm: 2.499 }]));
         assert_eq!(quick.distance(-12.499), 10.0);
         let nodes = quick.nodes(&profile, STRETCH, 20.0);
         assert!(nodes.contains(&0.0) && nodes.len() <= MOST_NODES, "{}", nodes.len());

@@ -3,12 +3,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::extruder::{Course, Extruder, Hats, float, whole};
-use super::profile::{Node, SpeedProfile};
+use super::flow::{Course, Extruder, Hats, float, whole};
+use super::profile::{ProfileNode, SpeedProfile};
 use super::quadratic::Quadratic;
-use super::segment::Segment;
-use super::slope::Clock;
+use super::segment::PathSegment;
 use super::task::{Bead, Unmodelled};
+use super::time_gradient::Clock;
 
 /// Time between two looks at the flow, for its standard deviation \[s\].
 const LOOK_S: f64 = 0.02;
@@ -64,7 +64,7 @@ pub struct Horizon<'a> {
     pub from_s: f64,
     /// Stretches over which the variance of the flow's change is taken, whose mean counts
     /// \[mm\].
-    pub changed: [Segment; 2],
+    pub changed: [PathSegment; 2],
     /// Where the width is judged.
     pub windows: Vec<Window>,
     /// What the command acts on.
@@ -119,7 +119,8 @@ impl Horizon<'_> {
 
     /// The speed with some squares at the nodes.
     pub fn profile(&self, squares: &[f64]) -> Option<SpeedProfile> {
-        let node = |(path_mm, square): (&f64, &f64)| Node { path_mm: *path_mm, square: *square };
+        let node =
+            |(path_mm, square): (&f64, &f64)| ProfileNode { path_mm: *path_mm, square: *square };
         let nodes: Vec<_> = self.path.iter().zip(squares).map(node).collect();
         SpeedProfile::of_squares(&nodes).ok()
     }
@@ -145,7 +146,11 @@ impl Horizon<'_> {
     }
 
     /// Moments at which the flow's change is taken \[s\].
-    fn looks(&self, profile: &SpeedProfile, stretch: Segment) -> impl Iterator<Item = f64> + use<> {
+    fn looks(
+        &self,
+        profile: &SpeedProfile,
+        stretch: PathSegment,
+    ) -> impl Iterator<Item = f64> + use<> {
         let (from, to) = (profile.time_at(stretch.from_mm), profile.time_at(stretch.to_mm));
         let start = self.from_s + from;
         (0..=whole((to - from) / LOOK_S)).map(move |look| start + LOOK_S * float(look))
@@ -212,7 +217,7 @@ impl Horizon<'_> {
 
     /// Adds the noise's cost through the variance of the flow, which is quadratic in the
     /// knots.
-    fn add_noise(&self, at: &Outcome, stretch: Segment, model: &mut Quadratic) {
+    fn add_noise(&self, at: &Outcome, stretch: PathSegment, model: &mut Quadratic) {
         let Quadratic { hessian, gradient } = model;
         let nodes = self.path.len();
         let knots = gradient.len() - nodes;

@@ -68,7 +68,7 @@ pub struct SpeedPoint {
 
 /// A node of a profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Node {
+pub(super) struct ProfileNode {
     /// Place \[mm\].
     pub(super) path_mm: f64,
     /// Square of the speed there \[mm²/s²\].
@@ -88,28 +88,28 @@ impl SpeedProfile {
     pub fn new(points: &[SpeedPoint]) -> Result<Self, ProfileError> {
         let node = |point: &SpeedPoint| {
             let speed = point.speed_mm_per_s;
-            Node { path_mm: point.path_mm, square: speed * speed.abs() }
+            ProfileNode { path_mm: point.path_mm, square: speed * speed.abs() }
         };
-        let nodes: Vec<Node> = points.iter().map(node).collect();
+        let nodes: Vec<ProfileNode> = points.iter().map(node).collect();
         Self::of_squares(&nodes)
     }
 
     /// From nodes in the order of the path.
-    pub(super) fn of_squares(nodes: &[Node]) -> Result<Self, ProfileError> {
+    pub(super) fn of_squares(nodes: &[ProfileNode]) -> Result<Self, ProfileError> {
         if nodes.len() < 2 {
             return Err(ProfileError::Short { nodes: nodes.len() });
         }
-        let mut before: Option<Node> = None;
+        let mut before: Option<ProfileNode> = None;
         let mut time = Vec::with_capacity(nodes.len());
         let mut now = 0.0;
-        for (at, &Node { path_mm, square }) in (1..).zip(nodes) {
+        for (at, &ProfileNode { path_mm, square }) in (1..).zip(nodes) {
             if !(square.is_finite() && square >= 0.0) {
                 return Err(ProfileError::Speed {
                     at,
                     speed: square.signum() * square.abs().sqrt(),
                 });
             }
-            if let Some(Node { path_mm: before_mm, square: last }) = before {
+            if let Some(ProfileNode { path_mm: before_mm, square: last }) = before {
                 if !(path_mm > before_mm && path_mm.is_finite()) {
                     return Err(ProfileError::Order { at, path_mm, before_mm });
                 }
@@ -121,7 +121,7 @@ impl SpeedProfile {
                 return Err(ProfileError::Order { at, path_mm, before_mm: f64::NEG_INFINITY });
             }
             time.push(now);
-            before = Some(Node { path_mm, square });
+            before = Some(ProfileNode { path_mm, square });
         }
         let (path, square) = nodes.iter().map(|node| (node.path_mm, node.square)).unzip();
         Ok(Self { path, square, time })

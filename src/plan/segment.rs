@@ -2,7 +2,7 @@
 
 /// A piece of path \[mm\].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Segment {
+pub struct PathSegment {
     /// Where it begins.
     pub from_mm: f64,
     /// Where it ends.

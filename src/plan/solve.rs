@@ -1,10 +1,10 @@
 //! A plan, and how it is made.
 
-use super::extruder::{KNOT_S, float, whole};
-use super::foretell::Foretold;
+use super::flow::{KNOT_S, float, whole};
 use super::limits::attainable;
-use super::long::Long;
+use super::prediction::Foretold;
 use super::profile::SpeedProfile;
+use super::receding_horizon::Long;
 use super::task::{AlongPath, PlanError, Task};
 
 /// Speed and command that belong together.

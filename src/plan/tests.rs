@@ -50,7 +50,7 @@ fn keeps_its_limits(plan: &Plan, nominal: &SpeedProfile, most_s: f64) {
         assert!((0.0..=10.0).contains(&pair[1]), "{pair:?}");
         assert!((pair[1] - pair[0]).abs() <= 20.0 * Plan::EVERY_S + 1e-9, "{pair:?}");
     }
-    assert!(Plan::EVERY_S * super::extruder::float(plan.command.len()) >= plan.speed.duration_s());
+    assert!(Plan::EVERY_S * super::flow::float(plan.command.len()) >= plan.speed.duration_s());
     assert!(plan.added_s >= -1e-9 && plan.added_s <= most_s + 1e-9, "{}", plan.added_s);
     assert!((plan.speed.duration_s() - nominal.duration_s() - plan.added_s).abs() < 1e-9);
 }

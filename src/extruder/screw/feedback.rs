@@ -2,10 +2,8 @@
 //! to a largest one, and the share that holds the setpoint at the setpoint.
 
 use super::error::{ScrewError, positive};
-use super::model::Screw;
+use super::model::{MM_PER_M, Screw};
 use crate::core::units::Mm;
-
-const MM_PER_M: f64 = 1000.0;
 
 /// What is asked of a law.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,7 +5,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::history::{Lags, Moment};
+use super::command_history::{Lags, Moment};
 use super::tuning::Tuning;
 
 /// Load's part of the pressure now and once settled \[MPa\]; errors of gain,

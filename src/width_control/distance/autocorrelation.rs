@@ -10,7 +10,7 @@
 
 use std::collections::VecDeque;
 
-use super::level::Surprise;
+use super::width_model::Surprise;
 
 /// Within this many gauges lie the widths that show the same piece of bead ...
 const NEAR: f64 = 1.5;

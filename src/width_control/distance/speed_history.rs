@@ -107,7 +107,7 @@ impl Trail {
         let before = std::mem::replace(&mut self.speed, speed.max(SLOWEST_MM_PER_S));
         match last {
             Some(last) if path_mm >= last.path_mm && at_s > last.at_s => {
-                self.extend(&last, (at_s, path_mm), before);
+                self.extend(&last, at_s, path_mm, before);
             }
             _ => {
                 self.clear();
@@ -132,7 +132,7 @@ impl Trail {
     }
 
     /// Adds the way from the last report to this one as a piece at each speed.
-    fn extend(&mut self, last: &Node, (at_s, path_mm): (f64, f64), before: f64) {
+    fn extend(&mut self, last: &Node, at_s: f64, path_mm: f64, before: f64) {
         let (way, time) = (path_mm - last.path_mm, at_s - last.at_s);
         let changed = (self.speed - before).abs() > SAME_SHARE * before;
         // Share of the time that was driven at the speed before.

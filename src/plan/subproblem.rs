@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::extruder::KNOT_S;
+use super::flow::KNOT_S;
 use super::horizon::{Choice, Horizon, Outcome};
 use super::quadratic::{Quadratic, Rows, Term, least};
-use super::slope::Clock;
+use super::time_gradient::Clock;
 use crate::extruder::limits::CommandLimits;
 
 /// Added to the scaled Hessian's diagonal, for directions that cost nothing.

@@ -1,6 +1,6 @@
 //! The start of a bead.
 
-use super::laid::Laid;
+use super::conditions::Laid;
 use crate::core::time::Span;
 use crate::core::units::Mm3PerS;
 use crate::identify::start_stop::parameters::StartStop;

@@ -1,6 +1,6 @@
 //! The end of a bead.
 
-use super::laid::Laid;
+use super::conditions::Laid;
 use crate::core::time::Span;
 use crate::core::units::Mm;
 use crate::identify::start_stop::parameters::StartStop;
@@ -9,7 +9,6 @@ use crate::identify::start_stop::parameters::StartStop;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stop {
     parameters: StartStop,
-    flow_mm3_per_s: f64,
     least_share: f64,
     robot_lag: Span,
     way: Mm,
@@ -26,7 +25,6 @@ impl Stop {
         let left_s = parameters.after_stop_s() - parameters.fallen_s(lasts_s);
         Self {
             parameters: *parameters,
-            flow_mm3_per_s: laid.flow.get(),
             least_share,
             robot_lag: laid.robot_lag,
             way: laid.speed * Span::from_secs(full_speed_s),
@@ -51,24 +49,6 @@ impl Stop {
         self.left_mm3
     }
 
-    /// From the end of the bead until so much is still to come \[mm³\]: how long
-    /// the robot waits where no more than that may drip on its way.
-    pub fn waits(&self, still_mm3: f64) -> Span {
-        let all_s = self.parameters.after_stop_s();
-        let [mut low, mut high] = [self.lasts_s, self.lasts_s];
-        let left = |at: f64| self.flow_mm3_per_s * (all_s - self.parameters.fallen_s(at));
-        let mut step_s = self.parameters.fall_s.max(self.parameters.drool_time_constant_s);
-        while left(high) > still_mm3.max(LEAST_MM3) && step_s.is_finite() {
-            (low, high) = (high, high + step_s);
-            step_s *= 2.0;
-        }
-        for _ in 0..BISECTIONS {
-            let middle = 0.5 * (low + high);
-            if left(middle) > still_mm3 { low = middle } else { high = middle }
-        }
-        Span::from_secs(high - self.lasts_s)
-    }
-
     /// The flow so long after the command, as a share of the flow before.
     pub fn flow_share(&self, since: Span) -> f64 {
         self.parameters.falling(since.secs())
@@ -80,9 +60,3 @@ impl Stop {
         self.flow_share(since + self.robot_lag).clamp(self.least_share, 1.0)
     }
 }
-
-/// A volume that no balance shows \[mm³\]; a flow that falls exponentially never
-/// comes to its end.
-const LEAST_MM3: f64 = 1e-3;
-/// Halvings after which nothing of a second is left.
-const BISECTIONS: u32 = 60;

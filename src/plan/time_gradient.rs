@@ -64,15 +64,17 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
     use super::*;
-    use crate::plan::profile::Node;
+    use crate::plan::profile::ProfileNode;
 
     #[test]
     fn slopes_are_those_of_the_exact_times() {
         let path = [0.0, 2.0, 5.0, 6.0];
         let squares = [400.0, 100.0, 900.0, 2500.0];
         let profile = |squares: &[f64]| {
-            let node =
-                |(path_mm, square): (&f64, &f64)| Node { path_mm: *path_mm, square: *square };
+            let node = |(path_mm, square): (&f64, &f64)| ProfileNode {
+                path_mm: *path_mm,
+                square: *square,
+            };
             let nodes: Vec<_> = path.iter().zip(squares).map(node).collect();
             SpeedProfile::of_squares(&nodes).unwrap()
         };

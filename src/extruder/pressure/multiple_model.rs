@@ -4,9 +4,9 @@
 //! estimation, Magill 1965).
 
 use super::Fopdt;
-use super::belief::{Belief, Filter, GAIN, LAG, LOAD, Left, State};
-use super::history::{CommandHistory, Lags};
-use super::jump::Watch;
+use super::command_history::{CommandHistory, Lags};
+use super::hypothesis::{Belief, Filter, GAIN, LAG, LOAD, Left, State};
+use super::load_step::Watch;
 use super::tuning::Tuning;
 
 /// Dead times beside each other, out to two standard deviations.
@@ -26,7 +26,6 @@ pub struct Bank {
     filter: Filter,
     beliefs: [Belief; BELIEFS],
     watch: Watch,
-    jumps: u64,
 }
 
 /// What the beliefs come to, a dead time ahead.
@@ -78,7 +77,7 @@ impl Bank {
             belief
         });
         let watch = Watch::new(filter.lag_s, tuning.load, tuning.evidence);
-        Self { filter, beliefs, watch, jumps: 0 }
+        Self { filter, beliefs, watch }
     }
 
     /// The longest time that is looked back by \[s\].
@@ -119,7 +118,6 @@ impl Bank {
             .and_then(|(_, innovation)| *innovation)
             .and_then(|innovation| self.watch.see(innovation, dt_s));
         if let Some(jump) = jump {
-            self.jumps += 1;
             for belief in &mut self.beliefs {
                 belief.jump(jump.settled, jump.grown, jump.variance);
             }
@@ -129,11 +127,6 @@ impl Bank {
     /// The dead time \[s\].
     pub fn dead_s(&self) -> f64 {
         self.beliefs.iter().map(|belief| belief.weight * belief.dead_s(&self.filter)).sum()
-    }
-
-    /// How many steps of the load have been taken for real.
-    pub const fn jumps(&self) -> u64 {
-        self.jumps
     }
 
     /// Where the commands until now will have brought the pressure a dead time

@@ -2,7 +2,7 @@
 //! innovations with a step that began at any of them to none (Willsky and
 //! Jones 1976), with a prior for the step's size.
 
-use super::belief::Innovation;
+use super::hypothesis::Innovation;
 
 /// Innovations that are looked back over.
 const WINDOW: usize = 16;

@@ -4,8 +4,8 @@
 //! (Bead that is as wide as wanted says nothing: the flow may have wandered, and
 //! the law taken it out.)
 
-use super::level::Surprise;
-use super::pairing::Pairing;
+use super::sample::Pairing;
+use super::width_model::Surprise;
 
 /// Logarithm of odds against the model from which it is given up, where the
 /// widths are off besides.

@@ -11,7 +11,6 @@ pub struct FeedHistory {
     count: usize,
     /// What was fed before the oldest change.
     before: f64,
-    latest: f64,
 }
 
 /// From here on this share is fed.
@@ -35,13 +34,12 @@ impl FeedHistory {
     /// held for as long as matters.
     pub fn new(capacity: usize, before: f64) -> Self {
         let changes = vec![Change::default(); capacity.max(1)].into_boxed_slice();
-        Self { changes, first: 0, count: 0, before, latest: f64::NEG_INFINITY }
+        Self { changes, first: 0, count: 0, before }
     }
 
     /// From `from` on `fill` is fed. A second share at the same place takes the
     /// place of the first.
     pub fn push(&mut self, from: f64, fill: f64) {
-        self.latest = from;
         let last = self.count.checked_sub(1).map(|last| self.get(last));
         if last.is_some_and(|last| last.from >= from) {
             self.count -= 1;
@@ -57,15 +55,6 @@ impl FeedHistory {
         if let Some(change) = self.changes.get_mut(slot) {
             *change = Change { from, fill };
             self.count += 1;
-        }
-    }
-
-    /// What was applied instead of the share that was pushed last.
-    pub fn amend(&mut self, fill: f64) {
-        if self.latest.is_finite() {
-            self.push(self.latest, fill);
-        } else {
-            self.before = fill;
         }
     }
 
@@ -156,10 +145,10 @@ mod tests {
     fn what_was_applied_takes_the_place_of_what_was_decided() {
         let mut history = FeedHistory::new(4, 0.2);
         history.push(1.0, 0.9);
-        history.amend(0.6);
+        history.push(1.0, 0.6);
         assert_eq!(pieces(&history, 0.0, 2.0), [(1.0, 0.2), (1.0, 0.6)]);
         history.push(2.0, 0.6);
-        history.amend(0.3);
+        history.push(2.0, 0.3);
         assert_eq!(pieces(&history, 1.0, 3.0), [(1.0, 0.6), (1.0, 0.3)]);
     }
 

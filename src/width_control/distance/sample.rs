@@ -1,7 +1,7 @@
 //! A width beside the speed at which that piece of bead was laid.
 
-use super::level::Surprise;
-use super::trail::Trail;
+use super::speed_history::Trail;
+use super::width_model::Surprise;
 
 /// Relative standard deviation that is left in a width however well it was
 /// measured: between two reports nobody knows the speed exactly.
@@ -16,6 +16,26 @@ const MOST_UNTOLD: f64 = 0.03;
 const DOUBTFUL: f64 = 0.5;
 /// The same from which it tells nothing about changes of the flow.
 const BLIND: f64 = 4.0;
+
+/// The piece of bead that a width is the mean of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GaugeInterval {
+    /// Its middle along the path \[mm\].
+    pub centre_mm: f64,
+    /// Its length \[mm\].
+    pub length_mm: f64,
+    /// How far its middle may be off \[mm\].
+    pub centre_tolerance_mm: f64,
+}
+
+/// A width as the camera gives it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// The width \[mm\].
+    pub width_mm: f64,
+    /// Its standard deviation \[mm\].
+    pub sigma_mm: f64,
+}
 
 /// A width, where and when that bead was laid, and how fast.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,17 +56,18 @@ pub struct Pairing {
 }
 
 impl Pairing {
-    /// At a place with a gauge \[mm\], a width and its standard deviation
-    /// \[mm\], and how far the place may be off \[mm\], for an exponent. `None`
+    /// Of a width beside the speeds of its gauge, for an exponent of the bead. `None`
     /// where the trail does not reach, and where the flow had been changed so far that the
     /// width says more of that than of the bead.
     pub fn of(
         trail: &Trail,
-        (place_mm, gauge_mm): (f64, f64),
-        (width, sigma): (f64, f64),
-        (off_mm, exponent): (f64, f64),
+        gauge: GaugeInterval,
+        measured: Measured,
+        exponent: f64,
     ) -> Option<Self> {
-        let half = 0.5 * gauge_mm;
+        let GaugeInterval { centre_mm: place_mm, length_mm, centre_tolerance_mm: off_mm } = gauge;
+        let Measured { width_mm: width, sigma_mm: sigma } = measured;
+        let half = 0.5 * length_mm;
         let over = trail.over(place_mm - half, place_mm + half)?;
         let beside = |by: f64| trail.near(place_mm - half + by, place_mm + half + by);
         let change = beside(off_mm)?.mean - beside(-off_mm)?.mean;
@@ -86,7 +107,8 @@ impl Pairing {
 const MEMORY_S: f64 = 1.5;
 /// Most of a squared surprise that counts: one outlier is no unrest.
 const MOST: f64 = 4.0;
-/// Mean of that for a normal number.
+/// Mean of that for a normal number. For min(z², 4) of a standard normal z it is 0.9205;
+/// this value is too small by a tenth, and so the limits below are reached earlier.
 const USUAL: f64 = 0.83;
 /// Unrest up to which the flow counts as calm.
 const CALM: f64 = 1.8;
@@ -144,7 +166,9 @@ mod tests {
     }
 
     fn pair(place: f64) -> Pairing {
-        Pairing::of(&trail(), (place, 10.0), (40.0, 0.4), (5.0, 0.25)).unwrap()
+        let gauge = GaugeInterval { centre_mm: place, length_mm: 10.0, centre_tolerance_mm: 5.0 };
+        let measured = Measured { width_mm: 40.0, sigma_mm: 0.4 };
+        Pairing::of(&trail(), gauge, measured, 0.25).unwrap()
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What comes of a speed and a command: flow over time and width over path, as far as the
 //! model tells.
 
-use super::extruder::{Course, TICK_S, float, follow, whole};
+use super::flow::{Course, TICK_S, float, follow, whole};
 use super::profile::SpeedProfile;
 use super::task::{AlongPath, PlanError, Task};
 use crate::core::time::Span;

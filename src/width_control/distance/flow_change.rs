@@ -8,8 +8,8 @@
 
 use std::collections::VecDeque;
 
-use super::level::{Level, Sight, Surprise};
-use super::pairing::Pairing;
+use super::sample::Pairing;
+use super::width_model::{Level, Sight, Surprise};
 
 /// Widths that are kept.
 const KEPT: usize = 32;
@@ -110,7 +110,8 @@ impl Changes {
     pub fn undone(
         &mut self,
         pairing: &Pairing,
-        (ln_width, now): (f64, Surprise),
+        ln_width: f64,
+        now: Surprise,
         drift: f64,
     ) -> Option<Level> {
         let trial = self.trial.as_mut()?;

@@ -1,13 +1,13 @@
 //! A job of any length, planned a few seconds at a time.
 
 use super::descent::descend;
-use super::extruder::{Extruder, Hats, KNOT_S, float, whole};
+use super::flow::{Extruder, Hats, KNOT_S, float, whole};
 use super::grid::Quick;
 use super::horizon::{Choice, Horizon, Outcome};
 use super::limits::reach;
-use super::profile::{Node, SpeedProfile};
-use super::segment::Segment;
-use super::step::Bounds;
+use super::profile::{ProfileNode, SpeedProfile};
+use super::segment::PathSegment;
+use super::subproblem::Bounds;
 use super::task::{PlanError, Task};
 
 /// How far ahead a horizon reaches at the nominal speed \[s\]; beyond a quick change within
@@ -31,7 +31,7 @@ pub struct Long<'a> {
     slow: Vec<f64>,
     extruder: Extruder,
     /// Nodes that are decided.
-    nodes: Vec<Node>,
+    nodes: Vec<ProfileNode>,
     /// When each is passed \[s\].
     times: Vec<f64>,
     knots: Vec<f64>,
@@ -62,7 +62,10 @@ impl<'a> Long<'a> {
             quick: Quick::of(nominal, task.limits.robot.accel_mm_per_s2),
             slow: slow_places(nominal),
             extruder: Extruder::settled(task.extruder, start)?,
-            nodes: first.map(|(s, b)| Node { path_mm: *s, square: *b }).into_iter().collect(),
+            nodes: first
+                .map(|(s, b)| ProfileNode { path_mm: *s, square: *b })
+                .into_iter()
+                .collect(),
             times: vec![0.0],
             knots: Vec::new(),
         })
@@ -98,7 +101,7 @@ impl<'a> Long<'a> {
 
     fn horizon_end(&self, here: f64) -> f64 {
         let to = self.later(here, AHEAD_S);
-        let quick = self.quick.within(Segment { from_mm: here, to_mm: to }).last();
+        let quick = self.quick.within(PathSegment { from_mm: here, to_mm: to }).last();
         let to = quick.map_or(to, |quick| to.max(self.later(quick.to_mm, BACK_S)));
         // A rest shorter than that is planned at once.
         if self.later(to, AHEAD_S - LEAD_S) >= self.nominal.end_mm() {
@@ -111,7 +114,7 @@ impl<'a> Long<'a> {
     /// Where the next horizon begins: as far from all quick changes as can be.
     fn commit_place(&self, here: f64, to: f64) -> f64 {
         let first = self.later(here, AHEAD_S - LEAD_S);
-        let unseen = self.quick.within(Segment { from_mm: to, to_mm: f64::INFINITY }).next();
+        let unseen = self.quick.within(PathSegment { from_mm: to, to_mm: f64::INFINITY }).next();
         let unseen = unseen.map_or(to, |quick| self.later(quick.from_mm, -LEAD_S));
         let last = self.later(to, -TAIL_S).min(unseen).max(first);
         let places = (0..=50).map(|k| first + (last - first) * f64::from(k) / 50.0);
@@ -130,7 +133,7 @@ impl<'a> Long<'a> {
         let decided = path.len();
         let ahead = self.quick.nodes(
             self.nominal,
-            Segment { from_mm: here, to_mm: to },
+            PathSegment { from_mm: here, to_mm: to },
             self.task.bead.nozzle_mm,
         );
         path.extend(ahead.iter().skip(1));
@@ -140,7 +143,7 @@ impl<'a> Long<'a> {
         let hats = Hats::new(self.task.extruder, count)?;
         let first =
             Choice { squares: bounds.ceiling.clone(), knots: vec![self.extruder.command(); count] };
-        let span = Segment { from_mm: path.first().copied().unwrap_or(here), to_mm: to };
+        let span = PathSegment { from_mm: path.first().copied().unwrap_or(here), to_mm: to };
         let (min, max) = self.task.limits.drive.range();
         let horizon = Horizon {
             bead: self.task.bead,
@@ -189,7 +192,7 @@ impl<'a> Long<'a> {
         let Open { from_s, decided, until_mm } = open;
         let nodes = outcome.profile.path().iter().zip(&choice.squares).zip(outcome.profile.times());
         for ((s, b), time) in nodes.skip(decided) {
-            self.nodes.push(Node { path_mm: *s, square: *b });
+            self.nodes.push(ProfileNode { path_mm: *s, square: *b });
             self.times.push(from_s + time);
             if *s >= until_mm {
                 break;

@@ -1,7 +1,7 @@
 //! Where the camera really looks: the offset that it was said to have, held
 //! against what the widths do when the speed changes.
 
-use super::trail::Trail;
+use super::speed_history::Trail;
 
 /// Offsets that are believed in beside each other.
 const COUNT: usize = 9;
