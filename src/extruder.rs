@@ -3,8 +3,8 @@
 //! keeps no clock and opens nothing.
 //!
 //! ```text
-//! flow that is wanted ─┐
-//! reports (50 Hz) ─────┼─▶ Supervisor ─▶ Law: foresee (200 Hz), answer (20 Hz) ─▶ limits ─▶ command (50 Hz)
+//! demanded flow ───────┐
+//! reports (50 Hz) ─────┼─▶ Supervisor ─▶ strategy: feedforward (200 Hz), feedback (20 Hz) ─▶ limits ─▶ command (50 Hz)
 //! ticks (200 Hz) ──────┘
 //! ```
 

@@ -1,5 +1,5 @@
-//! The extruder ahead of time: flow and volume for a command whose knots lie evenly and
-//! between which it runs straight.
+//! The extruder's model ahead of time: flow and volume for a command that is given at evenly
+//! spaced knots and is linear between them.
 
 use crate::numeric::lti::{Between, ModelError, Simulator, TransferFunction};
 

@@ -1,5 +1,4 @@
-//! What comes of a speed and a command: flow over time and width over path, as far as the
-//! model tells.
+//! What the model predicts for a speed and a command: flow over time and width over path.
 
 use super::flow::{Course, TICK_S, float, follow, whole};
 use super::profile::SpeedProfile;

@@ -1,4 +1,4 @@
-//! A job of any length, planned a few seconds at a time.
+//! A job of any length, planned a few seconds at a time (receding horizon).
 
 use super::descent::descend;
 use super::flow::{Extruder, Hats, KNOT_S, float, whole};

@@ -1,4 +1,4 @@
-//! One round: the convex problem about a choice and the change that it asks for.
+//! One round: the convex subproblem about an iterate, and the change that solves it.
 
 use nalgebra::{DMatrix, DVector};
 

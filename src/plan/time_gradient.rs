@@ -1,4 +1,4 @@
-//! How moments change with the squares of the speed at the nodes.
+//! Derivatives of the times of passage by the squares of the speed at the nodes.
 
 use super::profile::SpeedProfile;
 

@@ -1,19 +1,18 @@
-//! Width by distance: every width is held against the speed at which that piece
-//! of bead was laid, and the speed is set at which the next piece comes out as
-//! wanted.
+//! Width control by distance: every width is compared with the speed at which that piece of
+//! bead was laid, and the speed is set at which the next piece gets the wanted width.
 //!
-//! The bead is w = A·(v/v₀)^−b. What the camera sees now was laid a fixed
-//! *distance* ago, whatever the speed has been since, so that no dead time
-//! stands between a width and the speed that it tells about:
+//! The bead is w = A·(v/v₀)^−b. The camera sees bead that was laid a fixed *distance*
+//! earlier, whatever the speed has been since, so that no dead time lies between a width and
+//! the speed that it belongs to:
 //!
 //! ```text
-//! reports ─▶ trail ─┐ speed where the bead under the camera was laid
-//! width ± σ ────────┴▶ pairing ─▶ pulsation ─▶ change ─▶ level (ln A, b) ─▶ speed
-//!                        └─▶ offset (where the camera really looks)
+//! reports ─▶ speed history ─┐ speed where the bead under the camera was laid
+//! width ± σ ────────────────┴▶ sample ─▶ pulsation ─▶ flow change ─▶ width model (ln A, b) ─▶ speed
+//!                                └─▶ offset estimate (where the camera really looks)
 //! ```
 //!
-//! There are no gains: how much a width moves the estimate follows from its own
-//! standard deviation and from how much the flow is said to drift.
+//! There are no gains: how much a width moves the estimate follows from its own standard
+//! deviation and from the drift of the flow that the cell states.
 
 mod autocorrelation;
 mod flow_change;

@@ -3,7 +3,7 @@
 use nalgebra::Matrix4;
 
 use super::estimate::Estimate;
-use super::gains::{Adaptation, GainError, Gains, ScalarPlant, check};
+use super::gains::{Adaptation, GainError, Gains, Safety, ScalarPlant, check};
 use crate::core::time::Span;
 
 /// Samples that may be missed before the time between two is a gap.
@@ -198,8 +198,7 @@ impl AdaptiveLaw {
         let column = |state: [f64; 4]| {
             let [error, last, value, slope_per_s] = state;
             let mut estimate = Estimate { value, slope_per_s, last_error: Some(last) };
-            let free =
-                Gains { safety: super::Safety { bound: None, ..self.gains.safety }, ..self.gains };
+            let free = Gains { safety: Safety { bound: None, ..self.gains.safety }, ..self.gains };
             estimate.learn(self.plant, &free, error, hold_s);
             let acting = estimate.acting(self.plant, &free, error, hold_s);
             let fed_back = (free.feedback + free.error_feedback) * error;

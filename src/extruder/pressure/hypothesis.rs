@@ -1,7 +1,7 @@
-//! What is known of the process for one dead time: the load, and by how much
-//! gain, lag and dead time are off, by Kalman's filter (1960) with the model's
-//! own sensitivities as the row of the measurement. While the pressure moves,
-//! a difference from the model tells of the model; while it rests, of the load.
+//! The process for one dead time: the load, and the errors of gain, lag and dead time, by
+//! Kalman's filter (1960) with the model's own sensitivities as the row of the measurement.
+//! While the pressure moves, a difference from the model corrects the model; while it rests,
+//! the load.
 
 use nalgebra::{SMatrix, SVector};
 

@@ -1,7 +1,6 @@
-//! Beliefs for several dead times beside each other, each as probable as its
-//! readings make it: a dead time that is off bends the response where no
-//! straight line through one belief would follow it (multiple-model
-//! estimation, Magill 1965).
+//! Hypotheses for several dead times in parallel, each as probable as its readings make it: a
+//! dead time that is off bends the response where no straight line through one hypothesis
+//! would follow it (multiple-model estimation, Magill 1965).
 
 use super::Fopdt;
 use super::command_history::{CommandHistory, Lags};

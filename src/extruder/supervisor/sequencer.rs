@@ -1,4 +1,4 @@
-//! Starts and stops of a bead, where the cell says how its extruder starts and stops.
+//! Starts and stops of a bead, where the cell has the times of its extruder's starts and stops.
 
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, Mm3PerS, MmPerS};

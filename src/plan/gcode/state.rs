@@ -64,13 +64,11 @@ impl State {
     /// Takes a line's words.
     pub fn take(&mut self, line: usize, words: &[Word]) -> Result<Motion, GcodeError> {
         // Units go before the numbers that are in them.
-        for (letter, number) in words {
-            if *letter == 'G' {
-                self.code(line, *number, words)?;
-            }
+        for word in words.iter().filter(|word| word.letter == 'G') {
+            self.code(line, word.number, words)?;
         }
         let mut asked = Asked::default();
-        for (letter, number) in words.iter().copied() {
+        for Word { letter, number } in words.iter().copied() {
             match letter {
                 'X' => asked.axes[0] = Some(number),
                 'Y' => asked.axes[1] = Some(number),
@@ -99,8 +97,8 @@ impl State {
             90.0 => self.relative = false,
             91.0 => self.relative = true,
             // Setting the feeder's own count moves nothing.
-            92.0 if words.iter().all(|(letter, _)| matches!(letter, 'G' | 'E'))
-                && words.iter().any(|(letter, _)| *letter == 'E') => {}
+            92.0 if words.iter().all(|word| matches!(word.letter, 'G' | 'E'))
+                && words.iter().any(|word| word.letter == 'E') => {}
             _ if IDLE.contains(&number) => {}
             _ => return Err(unknown(line, 'G', number)),
         }

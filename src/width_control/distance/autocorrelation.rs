@@ -1,12 +1,12 @@
-//! How far widths hang together that should be independent. A rough bead and a restless
-//! flow show in every width that covers the same piece, so that ten frames of it say no
-//! more than one.
+//! Autocorrelation of widths that should be independent. A rough bead and an unsteady flow
+//! show in every width that covers the same piece, so that ten frames of it say no more than
+//! one.
 //!
-//! For every width its surprise is multiplied with itself and with those of the widths
-//! within one and a half gauges before it. The mean of the first, less one, and twice that
-//! of the others are by how much the noise of long means is larger than that of widths as
-//! they were foretold. What widths further back show of the same kind is taken off: that is
-//! a flow that wanders, which is to be followed.
+//! For every width its normalised innovation is multiplied with itself and with those of the
+//! widths within one and a half gauges before it. The mean of the first, less one, and twice
+//! that of the others say by how much the noise of long means exceeds that of independent
+//! widths. What widths further back show of the same kind is subtracted: that is a drift of
+//! the flow, which is to be followed.
 
 use std::collections::VecDeque;
 

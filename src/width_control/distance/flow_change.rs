@@ -1,10 +1,10 @@
-//! Sudden changes of the flow, told from outliers: the last widths are tried
-//! against every place at which the flow could have changed by a share.
+//! Sudden changes of the flow, distinguished from outliers: the last widths are tested
+//! against every position at which the flow could have changed by a factor.
 //!
 //! A change enters the gauge from one end, so that widths go over to the new
-//! one along the gauge's length. Only several widths that agree with one
-//! another make a change; the median of what each would have it to be is no
-//! outlier as long as most are none.
+//! value along the gauge's length. Only several widths that agree with one
+//! another make a change; the median of the sizes that they imply is robust as
+//! long as most are no outliers.
 
 use std::collections::VecDeque;
 
@@ -218,17 +218,18 @@ impl Changes {
     /// most of them agree.
     fn size(&self, first: usize, onset_mm: f64) -> Option<Found> {
         let before = self.looks.get(first)?.before;
-        let against = |look: &Look| {
-            let cover = self.cover(look.place_mm, onset_mm);
-            (cover, look.ln_width - before.foretold(look.ln_speed), look.variance)
+        let against = |look: &Look| Residual {
+            cover: self.cover(look.place_mm, onset_mm),
+            by: look.ln_width - before.foretold(look.ln_speed),
+            variance: look.variance,
         };
         let looks = || self.looks.range(first..).map(against);
         let (median, count) = median(looks())?;
-        let agrees = |(cover, by, variance): &(f64, f64, f64)| {
+        let agrees = |look: &Residual| {
             let rough = ROUGH * median;
-            (by - median * cover).powi(2) < AGREE * variance + rough * rough
+            (look.by - median * look.cover).powi(2) < AGREE * look.variance + rough * rough
         };
-        let heard = looks().filter(agrees).filter(|(cover, ..)| *cover >= LEAST_COVER).count();
+        let heard = looks().filter(agrees).filter(|look| look.cover >= LEAST_COVER).count();
         if heard < LEAST_WIDTHS || heard * 3 < count * 2 {
             return None;
         }
@@ -242,12 +243,23 @@ impl Changes {
     }
 }
 
+/// A width against what the level before a change foretells.
+#[derive(Debug, Clone, Copy)]
+struct Residual {
+    /// Share of its gauge beyond the change.
+    cover: f64,
+    /// Difference of the logarithms.
+    by: f64,
+    /// Variance of the width's own.
+    variance: f64,
+}
+
 /// Median of the sizes that widths would have a change to be, and how many had
 /// a say.
-fn median(looks: impl Iterator<Item = (f64, f64, f64)>) -> Option<(f64, usize)> {
+fn median(looks: impl Iterator<Item = Residual>) -> Option<(f64, usize)> {
     let mut sizes = [0.0; KEPT];
     let mut count = 0;
-    for (cover, by, _) in looks.filter(|(cover, ..)| *cover >= LEAST_COVER) {
+    for Residual { cover, by, .. } in looks.filter(|look| look.cover >= LEAST_COVER) {
         if let Some(size) = sizes.get_mut(count) {
             *size = by / cover;
             count += 1;
@@ -268,8 +280,8 @@ struct Sums {
 }
 
 impl Sums {
-    fn of(looks: impl Iterator<Item = (f64, f64, f64)>) -> Self {
-        looks.fold(Self::default(), |mut sums, (cover, by, variance)| {
+    fn of(looks: impl Iterator<Item = Residual>) -> Self {
+        looks.fold(Self::default(), |mut sums, Residual { cover, by, variance }| {
             let (says, counts) = (cover * by / variance, cover * cover / variance);
             sums.by += says;
             sums.squares += counts;

@@ -1,5 +1,5 @@
-//! One pulsation of a known period on a level that drifts: a Kalman filter on
-//! the level and on the pulsation's two parts, which turn with time.
+//! One harmonic of a known period on a level that drifts: a Kalman filter on the level and
+//! on the harmonic's two components, which rotate with time.
 
 use std::f64::consts::TAU;
 

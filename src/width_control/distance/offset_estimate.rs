@@ -1,5 +1,5 @@
-//! Where the camera really looks: the offset that it was said to have, held
-//! against what the widths do when the speed changes.
+//! Where the camera really looks: several offsets about the stated one, each weighted by how
+//! well it predicts the widths when the speed changes (a multiple-model estimate).
 
 use super::speed_history::Trail;
 

@@ -1,4 +1,4 @@
-//! A width beside the speed at which that piece of bead was laid.
+//! A width with the speed at which that piece of bead was laid.
 
 use super::speed_history::Trail;
 use super::width_model::Surprise;

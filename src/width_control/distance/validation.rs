@@ -1,8 +1,8 @@
-//! Whether the width answers the speed as the model says. A model in which the
-//! speed makes no difference is held against it, on bead that is not as wide as
-//! it was wanted: where that foretells better, whatever the law does is in vain.
-//! (Bead that is as wide as wanted says nothing: the flow may have wandered, and
-//! the law taken it out.)
+//! Model validation: whether the width answers the speed as the model predicts. The
+//! alternative is a model in which the speed makes no difference. The two are compared on
+//! bead whose width is off target: where the alternative predicts better, control by distance
+//! has no effect. (Bead on target says nothing: the flow may have drifted, and the controller
+//! may have removed that.)
 
 use super::sample::Pairing;
 use super::width_model::Surprise;

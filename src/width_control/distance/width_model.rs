@@ -1,5 +1,5 @@
-//! What is believed of the bead: the width at the reference speed and the
-//! exponent, ln w = ln A − b·ln(v/v₀), by a Kalman filter.
+//! The model of the bead: the width at the reference speed and the exponent,
+//! ln w = ln A − b·ln(v/v₀), by a Kalman filter.
 
 use nalgebra::{Matrix2, RowVector2, Vector2};
 
