@@ -8,7 +8,7 @@ use divan::{Bencher, black_box};
 use truebead::core::time::{Span, Stamp};
 use truebead::core::units::Mm;
 use truebead::extruder::screw::control::{Scheme, ScrewSettings};
-use truebead::extruder::screw::law::Setpoint;
+use truebead::extruder::screw::feedback::Setpoint;
 use truebead::extruder::screw::{
     FillLaw, PiecewiseExponential, Pulsation, Screw, ScrewControl, ScrewDesign,
 };

@@ -3,8 +3,8 @@
 //! keeps no clock and opens nothing.
 //!
 //! ```text
-//! flow that is wanted ─┐
-//! reports (50 Hz) ─────┼─▶ Supervisor ─▶ Law: foresee (200 Hz), answer (20 Hz) ─▶ limits ─▶ command (50 Hz)
+//! demanded flow ───────┐
+//! reports (50 Hz) ─────┼─▶ Supervisor ─▶ strategy: feedforward (200 Hz), feedback (20 Hz) ─▶ limits ─▶ command (50 Hz)
 //! ticks (200 Hz) ──────┘
 //! ```
 
@@ -12,7 +12,6 @@ pub mod adaptive;
 pub mod demand;
 pub mod drive;
 pub mod feedforward;
-pub mod law;
 pub mod limits;
 pub mod pressure;
 pub mod rates;
@@ -22,14 +21,15 @@ pub mod rheology;
 pub mod screw;
 pub mod start_stop;
 pub mod state;
+pub mod strategy;
 pub mod supervisor;
 pub mod trajectory;
 
-pub use demand::{FlowDemand, Follows, RobotFollows};
+pub use demand::{FlowDemand, Follows, RobotFollows, RobotSpeed};
 pub use drive::Drive;
-pub use law::Law;
 pub use limits::{CommandLimit, CommandLimits};
 pub use readings::ReadingFilters;
 pub use report::{ExtruderCommand, ExtruderReport, PumpMode};
 pub use state::{ExtruderFault, ExtruderHold, ExtruderState, ExtruderTrace};
+pub use strategy::Law;
 pub use supervisor::{ExtruderSetup, Laying, Supervisor};

@@ -3,7 +3,7 @@
 //! ```text
 //! job::read (CSV) ─┐
 //! gcode::read ─────┴▶ SpeedProfile ─▶ solve ─▶ Plan{ speed over path, command over time,
-//!                                                    foretold width, added time }
+//!                                                    predicted width, added time }
 //! ```
 //!
 //! The nozzle passes a corner in a few hundredths of a second, and the flow follows its
@@ -13,38 +13,42 @@
 //! corner itself leaves too much. [`solve()`] looks for the best of all such plans that the
 //! limits allow:
 //!
-//! 1. **Choice.** Squares of the speed at nodes of the path, between which they run
-//!    straight, so that the limit on the acceleration is linear and times are exact; and
+//! 1. **Decision variables.** Squares of the speed at nodes of the path, linear between
+//!    them, so that the limit on the acceleration is linear and times are exact; and
 //!    the command at knots in time, so that flow and volume are linear in it.
-//! 2. **Cost.** Squares of the error of the width, averaged over a nozzle's length, along
-//!    the path, and their expected rise by flow that no model tells, which is the larger
+//! 2. **Cost.** Squared error of the width, averaged over a nozzle's length, along
+//!    the path, and its expected increase by unmodelled flow, which is the larger
 //!    the more the flow is changed; a little for finer unevenness, for rough commands and
 //!    for time.
-//! 3. **Rounds.** About a choice the errors are linear in its change, by way of the times
+//! 3. **Rounds.** About an iterate the errors are linear in its change, by way of the times
 //!    at which the windows begin and end: a convex quadratic problem with linear limits.
-//!    Its answer is followed as far as the true cost falls. Every choice on the way keeps
+//!    Its solution is followed as far as the true cost falls. Every iterate keeps
 //!    all limits, so that there is a plan whenever the rounds end.
 //! 4. **Horizons.** A long job is planned a few seconds at a time, each from what was
 //!    decided before it.
 
 mod descent;
-mod extruder;
-pub mod foretell;
+mod flow;
 pub mod gcode;
 mod grid;
 mod horizon;
 pub mod job;
 pub mod limits;
-mod long;
+pub mod position;
+pub mod prediction;
 pub mod profile;
 mod quadratic;
-mod slope;
+mod receding_horizon;
+mod segment;
 pub mod solve;
-mod step;
+mod subproblem;
+pub mod task;
 #[cfg(test)]
 mod tests;
+mod time_gradient;
 
-pub use foretell::{Foretold, Unplanned};
 pub use limits::{PathLimits, attainable, time_optimal};
-pub use profile::{ProfileError, SpeedProfile};
-pub use solve::{Bead, Limits, Plan, PlanError, RobotLimits, Task, Unmodelled, solve};
+pub use prediction::{Foretold, Unplanned};
+pub use profile::{ProfileError, SpeedPoint, SpeedProfile};
+pub use solve::{Plan, solve};
+pub use task::{Bead, Limits, PlanError, RobotLimits, Task, Unmodelled};

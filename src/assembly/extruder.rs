@@ -17,7 +17,9 @@ use crate::core::time::Span;
 use crate::extruder::feedforward::{
     ExtruderModel, FeedforwardError, FlowForecast, InverseSettings, ScrewSpeed, Tracker,
 };
-use crate::extruder::law::{AdaptiveNozzle, Constant, Foreseen, Played, PressureLoop, ScrewFill};
+use crate::extruder::strategy::{
+    AdaptiveNozzle, Constant, Foreseen, Played, PressureLoop, ScrewFill,
+};
 use crate::extruder::{ExtruderSetup, Law};
 use crate::identify::profile;
 use crate::io::model_file;

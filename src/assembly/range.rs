@@ -7,7 +7,7 @@ use crate::cell::extruder::{ModelSource, Strategy};
 use crate::cell::file::ExtruderPart;
 use crate::core::units::MPa;
 use crate::extruder::Law;
-use crate::extruder::law::Played;
+use crate::extruder::strategy::Played;
 use crate::identify::file as model;
 use crate::identify::profile::Point;
 

@@ -7,7 +7,7 @@ use super::extruder_side::ExtruderSide;
 use super::phase::{Phase, Segment};
 use super::step::ExtruderStep;
 use crate::core::time::Stamp;
-use crate::extruder::Laying;
+use crate::extruder::{Laying, RobotSpeed};
 
 impl Controller {
     /// The extruder side's answer to what concerns it.
@@ -65,7 +65,8 @@ impl Controller {
         // the speed that comes. Nor does it follow a robot that goes by its flow.
         let goes_ahead = bead.segment == Segment::RunUp || supervisor.is_passing();
         let robot = self.robot.state.filter(|_| !goes_ahead);
-        let robot = robot.map(|robot| (requested, robot.speed_mm_per_s));
+        let robot =
+            robot.map(|robot| RobotSpeed { setpoint: requested, actual: robot.speed_mm_per_s });
         let flow = planned.map_or_else(|| demand.wanted(robot), |planned| planned.flow);
         let way = supervisor.way_of_stop(requested);
         let stops = bead.segment == Segment::Ending

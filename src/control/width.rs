@@ -10,6 +10,7 @@ use crate::core::units::Mm;
 use crate::width_control::controller::{Outlook, SpeedRequest, WidthSample, WidthTrace};
 use crate::width_control::limiter::Limit;
 use crate::width_control::pi::Saturation;
+use crate::width_control::target::BeadSegment;
 
 /// Least share of its speed from which the speed of a robot that goes by the
 /// flow is taken for the width controller's: below, the robot's limits say more of it.
@@ -90,7 +91,7 @@ impl Controller {
         let lasts = self.setup.setpoint_period;
         let target = self.robot.state.zip(self.laid_at(now)).map(|(state, laid)| {
             let from = laid + state.speed_mm_per_s * ROBOT_LAG;
-            let piece = (from, from + state.speed_mm_per_s * lasts);
+            let piece = BeadSegment { from, to: from + state.speed_mm_per_s * lasts };
             self.setup.control.target.over(state.z_mm, piece)
         });
         let path = self.robot.transport.path_at(now);

@@ -17,12 +17,12 @@
 
 mod estimate;
 mod gains;
-mod law;
+mod mrac;
 #[cfg(test)]
 mod tests;
 
 pub use gains::{Adaptation, GainError, Gains, Safety, ScalarPlant};
-pub use law::{Action, AdaptiveLaw, RampErrors};
+pub use mrac::{Action, AdaptiveLaw, RampErrors};
 
 use crate::core::time::Span;
 

@@ -32,6 +32,15 @@ pub enum RobotFollows {
     Flow,
 }
 
+/// What the robot was asked for, and what it does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RobotSpeed {
+    /// The last setpoint.
+    pub setpoint: MmPerS,
+    /// The speed that it reports.
+    pub actual: MmPerS,
+}
+
 /// The flow of a bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlowDemand {
@@ -74,10 +83,10 @@ impl FlowDemand {
 
     /// The flow that is wanted while the robot, told one speed, moves at
     /// another; none where the robot says nothing.
-    pub fn wanted(&self, robot: Option<(MmPerS, MmPerS)>) -> Mm3PerS {
+    pub fn wanted(&self, robot: Option<RobotSpeed>) -> Mm3PerS {
         match (self.follows, robot) {
-            (Follows::Robot, Some((told, moves))) if told > MmPerS::ZERO => {
-                self.nominal() * followed(moves / told).clamp(0.0, MOST)
+            (Follows::Robot, Some(robot)) if robot.setpoint > MmPerS::ZERO => {
+                self.nominal() * followed(robot.actual / robot.setpoint).clamp(0.0, MOST)
             }
             _ => self.nominal(),
         }
@@ -117,7 +126,10 @@ mod tests {
                 .wanted(robot)
                 .get()
         };
-        let speeds = |told, moves| Some((MmPerS::constant(told), MmPerS::constant(moves)));
+        let speeds = |setpoint, actual| {
+            let [setpoint, actual] = [setpoint, actual].map(MmPerS::constant);
+            Some(RobotSpeed { setpoint, actual })
+        };
         assert_eq!(flow(Follows::Robot, speeds(80.0, 80.0)), 400.0);
         assert_eq!(flow(Follows::Robot, speeds(80.0, 77.0)), 400.0);
         assert_eq!(flow(Follows::Robot, speeds(80.0, 83.0)), 400.0);

@@ -18,24 +18,24 @@ use super::limits::{CommandLimit, LimitError};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{MPa, Rpm};
 
-pub mod bank;
-pub mod belief;
-pub mod calls;
-pub mod history;
-pub mod jump;
+pub mod call_times;
+pub mod command_history;
+pub mod dead_zone;
+pub mod hypothesis;
 pub mod kalman;
+pub mod load_step;
+pub mod multiple_model;
 pub mod pi;
 pub mod predictive;
 pub mod reference;
 pub mod smith;
 pub mod tuning;
 pub mod vsfc;
-pub mod zone;
 
 #[cfg(test)]
 mod tests;
 
-pub use calls::Running;
+pub use call_times::Running;
 
 /// The longest dead time and lag that are taken \[s\].
 pub const LONGEST_S: f64 = 60.0;

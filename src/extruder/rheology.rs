@@ -3,7 +3,7 @@
 //! power law the pressure, the screw's drag flow its speed. Each both ways.
 //! Ma et al. 2026, eqs. (1) to (5).
 
-use crate::core::units::{MPa, Mm, Mm3PerS, Rpm};
+use crate::core::units::{MPa, Mm3PerS, Rpm};
 
 /// A bead, a law or a quantity that cannot be.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -101,16 +101,6 @@ impl DragFlow {
         Ok(Self { mm3_per_turn })
     }
 
-    /// From the screw's diameter, the depth of its channel and the angle of
-    /// its helix \[rad\]: half of π²·D²·H·sin θ·cos θ a turn.
-    pub fn of_screw(diameter: Mm, depth: Mm, helix_rad: f64) -> Result<Self, RheologyError> {
-        positive("the screw's diameter [mm]", diameter.get())?;
-        positive("the channel's depth [mm]", depth.get())?;
-        let (sin, cos) = libm::sincos(helix_rad);
-        let across = std::f64::consts::PI * diameter.get();
-        Self::new(0.5 * across * across * depth.get() * sin * cos)
-    }
-
     /// Speed of the screw that carries a flow.
     pub fn speed(&self, flow: Mm3PerS) -> Result<Rpm, RheologyError> {
         not_negative("the flow [mm³/s]", flow.get())?;
@@ -141,7 +131,7 @@ fn not_negative(what: &'static str, found: f64) -> Result<(), RheologyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::units::MmPerS;
+    use crate::core::units::{Mm, MmPerS};
     use crate::extruder::demand;
     use proptest::prelude::*;
 
@@ -167,16 +157,7 @@ mod tests {
         assert!(PowerLaw::new(26.5, f64::NAN, 1.11).is_err());
         assert!(PowerLaw::PP_GF28.flow(MPa::constant(-0.1)).is_err());
         assert!(PowerLaw::PP_GF28.flow(MPa::constant(1e300)).is_err());
-        assert!(DragFlow::of_screw(Mm::constant(20.0), Mm::constant(2.0), -0.3).is_err());
-    }
-
-    #[test]
-    fn a_screw_of_the_papers_size_carries_its_channel_with_every_turn() {
-        let helix = 0.307_92;
-        let screw = DragFlow::of_screw(Mm::constant(20.0), Mm::constant(2.0), helix).unwrap();
-        let flow = screw.flow(Rpm::constant(60.0)).unwrap();
-        let expected = 0.5 * std::f64::consts::PI.powi(2) * 400.0 * 2.0 * helix.sin() * helix.cos();
-        assert!((flow.get() - expected).abs() < 1e-9);
+        assert!(DragFlow::new(-0.3).is_err());
     }
 
     proptest! {

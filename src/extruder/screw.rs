@@ -3,7 +3,7 @@
 //! reaches the plug after a delay that depends on time and on the plug itself.
 //!
 //! [`Screw`] is the model, [`feasible`] says whether a feed can always reach
-//! the plug, [`law`] what to feed at a length of the plug, [`exact`] and
+//! the plug, [`feedback`] what to feed at a length of the plug, [`exact`] and
 //! [`euler`] where the plug will be when the feed arrives, and [`control`] all
 //! of it together.
 
@@ -13,12 +13,12 @@ pub mod error;
 pub mod euler;
 pub mod exact;
 pub mod feasible;
-pub mod history;
-pub mod law;
+pub mod feed_history;
+pub mod feedback;
 pub mod model;
 
 pub use control::{ScrewControl, ScrewFault, ScrewStep};
 pub use design::{ScrewDesign, TurnUnit};
 pub use error::ScrewError;
-pub use law::{FillLaw, PiecewiseExponential, Saturated};
+pub use feedback::{FillLaw, PiecewiseExponential, Saturated};
 pub use model::{Conveying, Pulsation, Screw};

@@ -19,30 +19,15 @@
 //! its speed follows the flow between m and 1, and starts and ends at m/2; m = 1
 //! is the robot that keeps its speed.
 
-mod begin;
-mod end;
+mod conditions;
+mod start;
+mod stop;
 
-pub use begin::{Pause, Start};
-pub use end::Stop;
+pub use conditions::Laid;
+pub use start::{Pause, Start};
+pub use stop::Stop;
 
-use crate::core::time::Span;
-use crate::core::units::{Mm3PerS, MmPerS};
 use crate::identify::start_stop::parameters::{StartStop, StartStopError};
-
-/// What is laid between a start and a stop.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Laid {
-    /// Flow that the bead needs at the robot's start speed.
-    pub flow: Mm3PerS,
-    /// The robot's start speed.
-    pub speed: MmPerS,
-    /// Share of that speed, above 0 to 1, down to which the robot may follow the
-    /// flow; 1 for a robot that keeps its speed.
-    pub least_share: f64,
-    /// How late the robot follows a speed that it is told; it is told so much
-    /// earlier.
-    pub robot_lag: Span,
-}
 
 /// Starts and stops of one kind of bead.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -13,24 +13,24 @@
 //!   the pump runs on all the same, not before it says that it stops.
 
 mod bead;
-mod pause;
+mod sequencer;
 mod watch;
 
 use std::sync::Arc;
 
-use super::law::{Law, Wish};
 use super::limits::{CommandLimit, CommandLimits};
 use super::rates::Rate;
 use super::readings::{ReadingFilters, Readings};
 use super::report::{ExtruderCommand, ExtruderReport};
 use super::start_stop::Timing;
 use super::state::{ExtruderFault, ExtruderHold, ExtruderState, ExtruderTrace};
+use super::strategy::{Law, Wish};
 use super::trajectory::PlannedJob;
 use super::{Drive, RobotFollows};
 use crate::core::readback::Follow;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{MPa, Mm, Mm3PerS, MmPerS};
-use pause::{Pauses, Shares};
+use sequencer::{Pauses, Shares};
 
 /// Most by which a robot that follows the flow is quickened.
 const MOST_SHARE: f64 = 1.5;

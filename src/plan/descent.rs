@@ -1,9 +1,9 @@
 //! From a first choice to the best one near it: the change that a convex problem asks for,
 //! as far as it really helps, and again.
 
-use super::extruder::KNOT_S;
+use super::flow::KNOT_S;
 use super::horizon::{Choice, Horizon, Outcome};
-use super::step::{Bounds, step};
+use super::subproblem::{Bounds, step};
 
 /// Rounds at most.
 const ROUNDS: usize = 25;

@@ -73,13 +73,13 @@ impl Stretch {
 pub fn read(text: &str, settings: &Settings) -> Result<Vec<Stretch>, GcodeError> {
     let mut state = State::new(settings.start_mm);
     let mut all = Vec::new();
-    let mut laid: Vec<(usize, Move, f64)> = Vec::new();
+    let mut laid: Vec<LaidMove> = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
         let words = words::words(line, text)?;
         match state.take(line, &words)? {
             Motion::None => {}
             Motion::Rapid => all.extend(stretch(&std::mem::take(&mut laid), settings)),
-            Motion::Laid(moved, feed) => laid.push((line, moved, feed)),
+            Motion::Laid(moved, feed) => laid.push(LaidMove { line, moved, feed }),
         }
         if state.ended() {
             break;
@@ -92,9 +92,18 @@ pub fn read(text: &str, settings: &Settings) -> Result<Vec<Stretch>, GcodeError>
     Ok(all)
 }
 
+/// A move that lays bead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct LaidMove {
+    line: usize,
+    moved: Move,
+    /// \[mm/s\].
+    feed: f64,
+}
+
 /// The bead of some moves; `None` of none.
-fn stretch(moves: &[(usize, Move, f64)], settings: &Settings) -> Option<Stretch> {
-    let (line, first, _) = moves.first()?;
+fn stretch(moves: &[LaidMove], settings: &Settings) -> Option<Stretch> {
+    let LaidMove { line, moved: first, .. } = moves.first()?;
     // A node is no faster than the pieces beside it.
     let end = match settings.ends {
         Ends::Rest => 0.0,
@@ -102,8 +111,8 @@ fn stretch(moves: &[(usize, Move, f64)], settings: &Settings) -> Option<Stretch>
     };
     let mut limits = PathLimits::new(0.0, end);
     let mut position = vec![(0.0, first.at(0.0))];
-    let after = moves.iter().skip(1).map(|(_, next, _)| Some(next)).chain([None]);
-    for ((_, moved, feed), next) in moves.iter().zip(after) {
+    let after = moves.iter().skip(1).map(|next| Some(&next.moved)).chain([None]);
+    for (LaidMove { moved, feed, .. }, next) in moves.iter().zip(after) {
         let from = limits.end_mm();
         let sideways = (settings.accel_mm_per_s2 * moved.radius_mm()).sqrt();
         let speed = feed.min(settings.fastest_mm_per_s).min(sideways);
@@ -140,16 +149,12 @@ fn junction(before: &Move, after: &Move, settings: &Settings) -> f64 {
         .clamp(settings.apex_mm_per_s, settings.fastest_mm_per_s.max(settings.apex_mm_per_s))
 }
 
-/// Distance of two places \[mm\].
-pub(super) fn distance(from: [f64; 3], to: [f64; 3]) -> f64 {
-    from.iter().zip(to).map(|(a, b)| (b - a) * (b - a)).sum::<f64>().sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
     use super::*;
+    use crate::plan::position::distance;
 
     const SETTINGS: Settings = Settings {
         start_mm: [0.0; 3],

@@ -3,7 +3,8 @@
 
 use super::horizon::Window;
 use super::profile::SpeedProfile;
-use super::solve::Bead;
+use super::segment::PathSegment;
+use super::task::Bead;
 
 /// A change of the speed of this share of the acceleration is quick.
 const QUICK: f64 = 0.1;
@@ -11,12 +12,13 @@ const QUICK: f64 = 0.1;
 const MOST_NODES: usize = 220;
 /// Distances of the nodes, in lengths of the nozzle: within how far from a quick change,
 /// and how far apart.
-const NODES: [(f64, f64); 3] = [(0.5, 0.025), (2.4, 0.1), (f64::INFINITY, 0.4)];
+const NODES: [Spacing; 3] =
+    [Spacing::new(0.5, 0.025), Spacing::new(2.4, 0.1), Spacing::new(f64::INFINITY, 0.4)];
 /// The same of the places where the width is judged over a nozzle's length.
-const PLACES: [(f64, f64); 2] = [(1.5, 0.05), (f64::INFINITY, 0.25)];
+const PLACES: [Spacing; 2] = [Spacing::new(1.5, 0.05), Spacing::new(f64::INFINITY, 0.25)];
 /// The same of those where it is judged more finely; none lies about the quick change
 /// itself, whose unevenness only the nozzle's length can take up.
-const FINE_PLACES: [(f64, f64); 2] = [(1.5, 0.05), (f64::INFINITY, 0.125)];
+const FINE_PLACES: [Spacing; 2] = [Spacing::new(1.5, 0.05), Spacing::new(f64::INFINITY, 0.125)];
 const FINE_FROM: f64 = 0.6;
 /// The finer length, in lengths of the nozzle, and what it counts: enough that a wave of
 /// the speed which a nozzle's length just hides is not taken for free.
@@ -30,22 +32,37 @@ const NEAR: f64 = 5.0;
 /// the nozzle: narrowly and widely.
 const CHANGED: [(f64, f64); 2] = [(5.0, 5.0), (11.0, 14.0)];
 
+/// How far places lie from each other near to a quick change, in lengths of the nozzle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Spacing {
+    /// Within how far from the change.
+    within: f64,
+    /// How far apart.
+    step: f64,
+}
+
+impl Spacing {
+    const fn new(within: f64, step: f64) -> Self {
+        Self { within, step }
+    }
+}
+
 /// Stretches of path in which the nominal speed changes quickly \[mm\].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Quick(Vec<(f64, f64)>);
+pub struct Quick(Vec<PathSegment>);
 
 impl Quick {
     /// Of a profile and the robot's acceleration \[mm/s²\].
     pub fn of(profile: &SpeedProfile, accel: f64) -> Self {
         let nodes = || profile.path().iter().zip(profile.squares());
-        let mut all: Vec<(f64, f64)> = Vec::new();
+        let mut all: Vec<PathSegment> = Vec::new();
         for ((s0, b0), (s1, b1)) in nodes().zip(nodes().skip(1)) {
             if (b1 - b0).abs() < QUICK * 2.0 * accel * (s1 - s0) {
                 continue;
             }
             match all.last_mut() {
-                Some((_, end)) if *end >= *s0 => *end = *s1,
-                _ => all.push((*s0, *s1)),
+                Some(last) if last.to_mm >= *s0 => last.to_mm = *s1,
+                _ => all.push(PathSegment { from_mm: *s0, to_mm: *s1 }),
             }
         }
         Self(all)
@@ -53,46 +70,51 @@ impl Quick {
 
     /// Distance of a place from the nearest \[mm\]; infinite where there is none.
     pub fn distance(&self, place_mm: f64) -> f64 {
-        let after = self.0.partition_point(|(_, end)| *end < place_mm);
+        let after = self.0.partition_point(|quick| quick.to_mm < place_mm);
         let before = after.checked_sub(1).and_then(|i| self.0.get(i));
-        let back = before.map_or(f64::INFINITY, |(_, end)| place_mm - end);
-        let ahead = self.0.get(after).map_or(f64::INFINITY, |(start, _)| start - place_mm);
+        let back = before.map_or(f64::INFINITY, |quick| place_mm - quick.to_mm);
+        let ahead = self.0.get(after).map_or(f64::INFINITY, |quick| quick.from_mm - place_mm);
         back.min(ahead).max(0.0)
     }
 
     /// Those that begin within a stretch \[mm\].
-    pub fn within(&self, from_mm: f64, to_mm: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
-        self.0.iter().copied().filter(move |(start, _)| *start >= from_mm && *start < to_mm)
+    pub fn within(&self, stretch: PathSegment) -> impl Iterator<Item = PathSegment> + '_ {
+        let PathSegment { from_mm, to_mm } = stretch;
+        self.0
+            .iter()
+            .copied()
+            .filter(move |quick| quick.from_mm >= from_mm && quick.from_mm < to_mm)
     }
 
     /// The parts of a stretch over which the flow's change is taken: from before the first
     /// to after the last, narrowly and widely \[mm\]. What is changed only outside the
     /// one shows in the other.
-    pub fn about(&self, (from, to): (f64, f64), nozzle_mm: f64) -> [(f64, f64); 2] {
-        let mut inside = self.within(from, to);
-        let Some(first) = inside.next() else { return [(from, to); 2] };
+    pub fn about(&self, stretch: PathSegment, nozzle_mm: f64) -> [PathSegment; 2] {
+        let mut inside = self.within(stretch);
+        let Some(first) = inside.next() else { return [stretch; 2] };
         let last = inside.last().unwrap_or(first);
-        CHANGED.map(|(before, after)| {
-            (from.max(first.0 - before * nozzle_mm), to.min(last.1 + after * nozzle_mm))
+        CHANGED.map(|(before, after)| PathSegment {
+            from_mm: stretch.from_mm.max(first.from_mm - before * nozzle_mm),
+            to_mm: stretch.to_mm.min(last.to_mm + after * nozzle_mm),
         })
     }
 
     /// Places from one to another, both included, as far apart as the distance from here
     /// says.
-    fn places(&self, (from, to): (f64, f64), unit: f64, steps: &[(f64, f64)]) -> Vec<f64> {
+    fn places(&self, stretch: PathSegment, unit: f64, spacings: &[Spacing]) -> Vec<f64> {
         let mut all = Vec::new();
-        let mut at = from;
+        let PathSegment { from_mm: mut at, to_mm: to } = stretch;
         while at < to {
             all.push(at);
             // The finest step that is not left before it ends.
-            let fitting = steps.iter().rev().map(|(_, step)| step * unit).find(|step| {
+            let fitting = spacings.iter().rev().map(|s| s.step * unit).find(|step| {
                 let near = self.distance(at + step).min(self.distance(at));
-                steps
+                spacings
                     .iter()
-                    .find(|(reach, _)| near <= reach * unit)
-                    .is_none_or(|s| s.1 * unit >= *step)
+                    .find(|s| near <= s.within * unit)
+                    .is_none_or(|s| s.step * unit >= *step)
             });
-            at += fitting.or_else(|| steps.first().map(|s| s.1 * unit)).unwrap_or(unit);
+            at += fitting.or_else(|| spacings.first().map(|s| s.step * unit)).unwrap_or(unit);
         }
         all.push(to);
         all
@@ -101,12 +123,12 @@ impl Quick {
     /// Nodes of the speed from one place to another \[mm\]. Those of the nominal speed are
     /// among them, so that a straight line between two nodes lies nowhere above it and the
     /// nominal speed itself can be planned.
-    pub fn nodes(&self, nominal: &SpeedProfile, span: (f64, f64), nozzle_mm: f64) -> Vec<f64> {
+    pub fn nodes(&self, nominal: &SpeedProfile, span: PathSegment, nozzle_mm: f64) -> Vec<f64> {
         let turns = turns(nominal, span);
         let mut unit = nozzle_mm;
         loop {
             let even = self.places(span, unit, &NODES);
-            let apart = 0.5 * unit * NODES.first().map_or(0.0, |(_, step)| *step);
+            let apart = 0.5 * unit * NODES.first().map_or(0.0, |s| s.step);
             let merged = merge(&even, &turns, apart);
             if merged.len() <= MOST_NODES.max(turns.len() + 2) || unit > 8.0 * nozzle_mm {
                 return merged;
@@ -116,7 +138,7 @@ impl Quick {
     }
 
     /// Where the width is judged, over pieces that lie within a stretch \[mm\].
-    pub fn windows(&self, (from, to): (f64, f64), bead: &Bead) -> Vec<Window> {
+    pub fn windows(&self, stretch: PathSegment, bead: &Bead) -> Vec<Window> {
         let mut all = Vec::new();
         let nozzle_mm = bead.nozzle_mm;
         let fine = FINE_LENGTH * nozzle_mm;
@@ -125,8 +147,11 @@ impl Quick {
         let whole =
             lengths.map(|(length_mm, weight)| (length_mm, weight, &PLACES, f64::NEG_INFINITY));
         for (length_mm, weight, steps, beyond) in whole.chain([fine]) {
-            let inside = (from + 0.5 * length_mm, to - 0.5 * length_mm);
-            if inside.1 <= inside.0 {
+            let inside = PathSegment {
+                from_mm: stretch.from_mm + 0.5 * length_mm,
+                to_mm: stretch.to_mm - 0.5 * length_mm,
+            };
+            if inside.to_mm <= inside.from_mm {
                 continue;
             }
             let places = self.places(inside, nozzle_mm, steps);
@@ -157,7 +182,7 @@ fn lengths(bead: &Bead) -> Vec<(f64, f64)> {
 }
 
 /// Places within a stretch at which a profile's acceleration changes \[mm\].
-fn turns(profile: &SpeedProfile, (from, to): (f64, f64)) -> Vec<f64> {
+fn turns(profile: &SpeedProfile, stretch: PathSegment) -> Vec<f64> {
     let nodes = || profile.path().iter().zip(profile.squares());
     let slope = |a: (&f64, &f64), b: (&f64, &f64)| (b.1 - a.1) / (b.0 - a.0);
     nodes()
@@ -165,7 +190,7 @@ fn turns(profile: &SpeedProfile, (from, to): (f64, f64)) -> Vec<f64> {
         .zip(nodes().skip(2))
         .filter(|((a, b), c)| slope(*a, *b) != slope(*b, *c))
         .map(|((_, b), _)| *b.0)
-        .filter(|s| *s > from && *s < to)
+        .filter(|s| *s > stretch.from_mm && *s < stretch.to_mm)
         .collect()
 }
 
@@ -186,20 +211,22 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
     use super::*;
+    use crate::plan::profile::profile_of;
+
+    const STRETCH: PathSegment = PathSegment { from_mm: -200.0, to_mm: 250.0 };
 
     fn corner() -> SpeedProfile {
         let top = 100.0;
-        SpeedProfile::new(&[(-300.0, top), (-2.499, top), (0.0, 2.0), (2.499, top), (300.0, top)])
-            .unwrap()
+        profile_of(&[(-300.0, top), (-2.499, top), (0.0, 2.0), (2.499, top), (300.0, top)]).unwrap()
     }
 
     #[test]
     fn a_corner_is_one_quick_stretch_with_its_apex_among_the_nodes() {
         let profile = corner();
         let quick = Quick::of(&profile, 2000.0);
-        assert_eq!(quick, Quick(vec![(-2.499, 2.499)]));
+        assert_eq!(quick, Quick(vec![PathSegment { from_mm: -2.499, to_mm: 2.499 }]));
         assert_eq!(quick.distance(-12.499), 10.0);
-        let nodes = quick.nodes(&profile, (-200.0, 250.0), 20.0);
+        let nodes = quick.nodes(&profile, STRETCH, 20.0);
         assert!(nodes.contains(&0.0) && nodes.len() <= MOST_NODES, "{}", nodes.len());
         assert_eq!((nodes[0], nodes[nodes.len() - 1]), (-200.0, 250.0));
         for pair in nodes.windows(2) {
@@ -215,7 +242,7 @@ mod tests {
     fn the_windows_weigh_what_the_path_is_long() {
         let quick = Quick::of(&corner(), 2000.0);
         let bead = Bead { area_mm2: 45.0, nozzle_mm: 20.0, nozzle_doubt: 0.0 };
-        let windows = quick.windows((-200.0, 250.0), &bead);
+        let windows = quick.windows(STRETCH, &bead);
         let coarse = windows.iter().filter(|w| w.length_mm == 20.0);
         let sum: f64 = coarse.map(|w| w.weight).sum();
         assert!((sum - 430.0).abs() < 1e-9, "{sum}");

@@ -3,10 +3,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::extruder::{Course, Extruder, Hats, float, whole};
-use super::profile::SpeedProfile;
-use super::slope::Clock;
-use super::solve::{Bead, Unmodelled};
+use super::flow::{Course, Extruder, Hats, float, whole};
+use super::profile::{ProfileNode, SpeedProfile};
+use super::quadratic::Quadratic;
+use super::segment::PathSegment;
+use super::task::{Bead, Unmodelled};
+use super::time_gradient::Clock;
 
 /// Time between two looks at the flow, for its standard deviation \[s\].
 const LOOK_S: f64 = 0.02;
@@ -62,7 +64,7 @@ pub struct Horizon<'a> {
     pub from_s: f64,
     /// Stretches over which the variance of the flow's change is taken, whose mean counts
     /// \[mm\].
-    pub changed: [(f64, f64); 2],
+    pub changed: [PathSegment; 2],
     /// Where the width is judged.
     pub windows: Vec<Window>,
     /// What the command acts on.
@@ -117,7 +119,9 @@ impl Horizon<'_> {
 
     /// The speed with some squares at the nodes.
     pub fn profile(&self, squares: &[f64]) -> Option<SpeedProfile> {
-        let nodes: Vec<_> = self.path.iter().copied().zip(squares.iter().copied()).collect();
+        let node =
+            |(path_mm, square): (&f64, &f64)| ProfileNode { path_mm: *path_mm, square: *square };
+        let nodes: Vec<_> = self.path.iter().zip(squares).map(node).collect();
         SpeedProfile::of_squares(&nodes).ok()
     }
 
@@ -145,23 +149,24 @@ impl Horizon<'_> {
     fn looks(
         &self,
         profile: &SpeedProfile,
-        stretch: (f64, f64),
+        stretch: PathSegment,
     ) -> impl Iterator<Item = f64> + use<> {
-        let (from, to) = (profile.time_at(stretch.0), profile.time_at(stretch.1));
+        let (from, to) = (profile.time_at(stretch.from_mm), profile.time_at(stretch.to_mm));
         let start = self.from_s + from;
         (0..=whole((to - from) / LOOK_S)).map(move |look| start + LOOK_S * float(look))
     }
 
-    /// The quadratic model of the cost about an outcome: Gauss's and Newton's Hessian and
-    /// the gradient, for the squares of the speed and then the knots.
-    pub fn model(&self, choice: &Choice, at: &Outcome) -> (DMatrix<f64>, DVector<f64>) {
+    /// The quadratic model of the cost about an outcome, with Gauss's and Newton's Hessian,
+    /// for the squares of the speed and then the knots.
+    pub fn model(&self, choice: &Choice, at: &Outcome) -> Quadratic {
         let nodes = self.path.len();
         let size = nodes + choice.knots.len();
-        let (jacobian, mut gradient) = self.linear(choice, at);
-        let mut hessian = &jacobian * jacobian.transpose() * 2.0;
+        let (jacobian, gradient) = self.linear(choice, at);
+        let mut model = Quadratic { hessian: &jacobian * jacobian.transpose() * 2.0, gradient };
         for stretch in self.changed {
-            self.add_noise(at, stretch, (&mut hessian, &mut gradient));
+            self.add_noise(at, stretch, &mut model);
         }
+        let Quadratic { hessian, gradient } = &mut model;
         let weight = 2.0 * self.rough_weight();
         for (knot, rise) in (nodes..size).zip(self.rises(choice)) {
             hessian[(knot, knot)] += weight;
@@ -173,7 +178,7 @@ impl Horizon<'_> {
                 gradient[knot - 1] -= weight * rise;
             }
         }
-        (hessian, gradient)
+        model
     }
 
     /// Slopes of the weighted errors, a column a window, and the gradient of their squares,
@@ -212,12 +217,8 @@ impl Horizon<'_> {
 
     /// Adds the noise's cost through the variance of the flow, which is quadratic in the
     /// knots.
-    fn add_noise(
-        &self,
-        at: &Outcome,
-        stretch: (f64, f64),
-        (hessian, gradient): (&mut DMatrix<f64>, &mut DVector<f64>),
-    ) {
+    fn add_noise(&self, at: &Outcome, stretch: PathSegment, model: &mut Quadratic) {
+        let Quadratic { hessian, gradient } = model;
         let nodes = self.path.len();
         let knots = gradient.len() - nodes;
         let looks: Vec<f64> = self.looks(&at.profile, stretch).collect();

@@ -1,6 +1,7 @@
 //! The planned profile of a job from a table: path length, position and nominal speed.
 
-use super::profile::{ProfileError, SpeedProfile};
+use super::position::{Position, distance};
+use super::profile::{ProfileError, SpeedPoint, SpeedProfile};
 use crate::document::csv::{LineProblem, in_words};
 
 /// Columns that are read; others are left alone.
@@ -71,55 +72,66 @@ pub enum JobError {
 /// A way may be longer than its path by rounding: this share of it and this much \[mm\].
 const ROUNDED: (f64, f64) = (1e-3, 0.01);
 
+/// A column of the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Column {
+    name: &'static str,
+    at: usize,
+}
+
+/// Where the nozzle is after some path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Waypoint {
+    path_mm: f64,
+    position: Position,
+}
+
 /// Reads a job from the text of a table with a heading.
 pub fn read(text: &str) -> Result<Job, JobError> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let heading = reader.headers().map_err(|error| of_row(&error))?.clone();
-    let place = |column: &'static str| {
-        heading.iter().position(|name| name == column).ok_or(JobError::Column { column })
+    let column = |name: &'static str| {
+        let at = heading.iter().position(|found| found == name);
+        Ok(Column { name, at: at.ok_or(JobError::Column { column: name })? })
     };
-    let (path, speed) = ((PATH, place(PATH)?), (SPEED, place(SPEED)?));
-    let [x, y, z] = POSITION.map(|column| place(column).map(|at| (column, at)));
+    let (path, speed) = (column(PATH)?, column(SPEED)?);
+    let [x, y, z] = POSITION.map(column);
     let axes = [x?, y?, z?];
-    let (mut nodes, mut position, mut lines) = (Vec::new(), Vec::new(), Vec::new());
-    let mut before: Option<(f64, [f64; 3])> = None;
+    let (mut points, mut position, mut lines) = (Vec::new(), Vec::new(), Vec::new());
+    let mut before: Option<Waypoint> = None;
     for record in reader.records() {
         let record = record.map_err(|error| of_row(&error))?;
         let line = record.position().map_or(0, csv::Position::line);
-        let number = |column: (&'static str, usize)| number(&record, line, column);
-        let here = (number(path)?, [number(axes[0])?, number(axes[1])?, number(axes[2])?]);
+        let number = |column: Column| number(&record, line, column);
+        let here = Waypoint {
+            path_mm: number(path)?,
+            position: [number(axes[0])?, number(axes[1])?, number(axes[2])?],
+        };
         if let Some(before) = before {
             check_way(line, before, here)?;
         }
         lines.push(line);
-        nodes.push((here.0, number(speed)?));
-        position.push(here);
+        points.push(SpeedPoint { path_mm: here.path_mm, speed_mm_per_s: number(speed)? });
+        position.push((here.path_mm, here.position));
         before = Some(here);
     }
-    let speed = SpeedProfile::new(&nodes).map_err(|error| {
+    let speed = SpeedProfile::new(&points).map_err(|error| {
         let at = error.point().and_then(|point| point.checked_sub(1));
         JobError::Profile { line: at.and_then(|at| lines.get(at).copied()), error }
     })?;
     Ok(Job { speed, position })
 }
 
-fn number(
-    record: &csv::StringRecord,
-    line: u64,
-    (column, at): (&'static str, usize),
-) -> Result<f64, JobError> {
+fn number(record: &csv::StringRecord, line: u64, column: Column) -> Result<f64, JobError> {
+    let Column { name: column, at } = column;
     let found = record.get(at).unwrap_or_default();
     let value = found.parse().ok().filter(|value: &f64| value.is_finite());
     value.ok_or_else(|| JobError::Number { line, column, found: found.to_owned() })
 }
 
-fn check_way(
-    line: u64,
-    (before_mm, from): (f64, [f64; 3]),
-    (here_mm, to): (f64, [f64; 3]),
-) -> Result<(), JobError> {
-    let way_mm = super::gcode::distance(from, to);
-    let path_mm = here_mm - before_mm;
+fn check_way(line: u64, before: Waypoint, here: Waypoint) -> Result<(), JobError> {
+    let way_mm = distance(before.position, here.position);
+    let path_mm = here.path_mm - before.path_mm;
     // A path that does not grow is for the profile to say.
     if path_mm > 0.0 && way_mm > path_mm * (1.0 + ROUNDED.0) + ROUNDED.1 {
         return Err(JobError::Way { line, path_mm, way_mm });

@@ -1,6 +1,6 @@
 //! Limits of the speed along a path, and the quickest way to keep them.
 
-use super::profile::{ProfileError, SpeedProfile};
+use super::profile::{ProfileError, ProfileNode, SpeedProfile};
 
 /// How fast a path may be passed: a limit for each node and one for each piece between
 /// two of them.
@@ -49,12 +49,13 @@ pub fn time_optimal(limits: &PathLimits, accel: f64) -> Result<SpeedProfile, Pro
     }
     reach(&limits.path, &mut nodes, accel);
     let mut all = Vec::with_capacity(3 * nodes.len());
-    let ends = limits.path.iter().zip(&nodes);
-    for (((s0, b0), (s1, b1)), top) in ends.clone().zip(ends.skip(1)).zip(&pieces) {
-        all.push((*s0, *b0));
-        all.extend(between((*s0, *b0), (*s1, *b1), *top, accel));
+    let node = |(path_mm, square): (&f64, &f64)| ProfileNode { path_mm: *path_mm, square: *square };
+    let ends = limits.path.iter().zip(&nodes).map(node);
+    for ((first, second), top) in ends.clone().zip(ends.skip(1)).zip(&pieces) {
+        all.push(first);
+        all.extend(between(first, second, *top, accel));
     }
-    all.extend(limits.path.last().copied().zip(nodes.last().copied()));
+    all.extend(limits.path.last().zip(nodes.last()).map(node));
     SpeedProfile::of_squares(&all)
 }
 
@@ -86,7 +87,8 @@ fn check(limits: &PathLimits) -> Result<(), ProfileError> {
 pub fn attainable(profile: &SpeedProfile, accel: f64) -> Result<SpeedProfile, ProfileError> {
     let mut squares = profile.squares().to_vec();
     reach(profile.path(), &mut squares, accel);
-    let nodes: Vec<_> = profile.path().iter().copied().zip(squares).collect();
+    let node = |(path_mm, square): (&f64, f64)| ProfileNode { path_mm: *path_mm, square };
+    let nodes: Vec<_> = profile.path().iter().zip(squares).map(node).collect();
     SpeedProfile::of_squares(&nodes)
 }
 
@@ -104,18 +106,21 @@ pub(super) fn reach(path: &[f64], squares: &mut [f64], accel: f64) {
 /// The nodes that a piece needs between its ends: where it reaches the top, and where it
 /// leaves it.
 fn between(
-    (s0, b0): (f64, f64),
-    (s1, b1): (f64, f64),
+    first: ProfileNode,
+    second: ProfileNode,
     top: f64,
     accel: f64,
-) -> impl Iterator<Item = (f64, f64)> {
+) -> impl Iterator<Item = ProfileNode> {
+    let (ProfileNode { path_mm: s0, square: b0 }, ProfileNode { path_mm: s1, square: b1 }) =
+        (first, second);
     let peak = (0.5 * (b0 + b1) + accel * (s1 - s0)).min(top);
     let (up, down) = (s0 + (peak - b0) / (2.0 * accel), s1 - (peak - b1) / (2.0 * accel));
     // Nodes nearer than this to another are the same.
     let apart = 1e-9 * (s1 - s0);
-    let rises = (up > s0 + apart && up < s1 - apart).then_some((up, peak));
+    let rises =
+        (up > s0 + apart && up < s1 - apart).then_some(ProfileNode { path_mm: up, square: peak });
     let falls = down > s0 + apart && down < s1 - apart && down > up + apart;
-    rises.into_iter().chain(falls.then_some((down, peak)))
+    rises.into_iter().chain(falls.then_some(ProfileNode { path_mm: down, square: peak }))
 }
 
 #[cfg(test)]

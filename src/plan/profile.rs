@@ -57,6 +57,24 @@ impl ProfileError {
     }
 }
 
+/// A speed at a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpeedPoint {
+    /// Place \[mm\].
+    pub path_mm: f64,
+    /// Speed there \[mm/s\].
+    pub speed_mm_per_s: f64,
+}
+
+/// A node of a profile.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ProfileNode {
+    /// Place \[mm\].
+    pub(super) path_mm: f64,
+    /// Square of the speed there \[mm²/s²\].
+    pub(super) square: f64,
+}
+
 /// The speed along a path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpeedProfile {
@@ -66,28 +84,32 @@ pub struct SpeedProfile {
 }
 
 impl SpeedProfile {
-    /// From places \[mm\] in order and the speed at each \[mm/s\].
-    pub fn new(nodes: &[(f64, f64)]) -> Result<Self, ProfileError> {
-        let squares: Vec<(f64, f64)> = nodes.iter().map(|(s, v)| (*s, v * v.abs())).collect();
-        Self::of_squares(&squares)
+    /// From points in the order of the path.
+    pub fn new(points: &[SpeedPoint]) -> Result<Self, ProfileError> {
+        let node = |point: &SpeedPoint| {
+            let speed = point.speed_mm_per_s;
+            ProfileNode { path_mm: point.path_mm, square: speed * speed.abs() }
+        };
+        let nodes: Vec<ProfileNode> = points.iter().map(node).collect();
+        Self::of_squares(&nodes)
     }
 
-    /// From places \[mm\] in order and the square of the speed at each \[mm²/s²\].
-    pub(super) fn of_squares(nodes: &[(f64, f64)]) -> Result<Self, ProfileError> {
+    /// From nodes in the order of the path.
+    pub(super) fn of_squares(nodes: &[ProfileNode]) -> Result<Self, ProfileError> {
         if nodes.len() < 2 {
             return Err(ProfileError::Short { nodes: nodes.len() });
         }
-        let mut before: Option<(f64, f64)> = None;
+        let mut before: Option<ProfileNode> = None;
         let mut time = Vec::with_capacity(nodes.len());
         let mut now = 0.0;
-        for (at, &(path_mm, square)) in (1..).zip(nodes) {
+        for (at, &ProfileNode { path_mm, square }) in (1..).zip(nodes) {
             if !(square.is_finite() && square >= 0.0) {
                 return Err(ProfileError::Speed {
                     at,
                     speed: square.signum() * square.abs().sqrt(),
                 });
             }
-            if let Some((before_mm, last)) = before {
+            if let Some(ProfileNode { path_mm: before_mm, square: last }) = before {
                 if !(path_mm > before_mm && path_mm.is_finite()) {
                     return Err(ProfileError::Order { at, path_mm, before_mm });
                 }
@@ -99,9 +121,9 @@ impl SpeedProfile {
                 return Err(ProfileError::Order { at, path_mm, before_mm: f64::NEG_INFINITY });
             }
             time.push(now);
-            before = Some((path_mm, square));
+            before = Some(ProfileNode { path_mm, square });
         }
-        let (path, square) = nodes.iter().copied().unzip();
+        let (path, square) = nodes.iter().map(|node| (node.path_mm, node.square)).unzip();
         Ok(Self { path, square, time })
     }
 
@@ -198,6 +220,13 @@ struct Piece {
     time: f64,
 }
 
+/// The profile through places \[mm\] with speeds \[mm/s\].
+#[cfg(test)]
+pub(super) fn profile_of(points: &[(f64, f64)]) -> Result<SpeedProfile, ProfileError> {
+    let point = |&(path_mm, speed_mm_per_s)| SpeedPoint { path_mm, speed_mm_per_s };
+    SpeedProfile::new(&points.iter().map(point).collect::<Vec<_>>())
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
@@ -205,7 +234,7 @@ mod tests {
     use super::*;
 
     fn dip() -> SpeedProfile {
-        SpeedProfile::new(&[(-10.0, 100.0), (-2.0, 100.0), (0.0, 10.0), (3.0, 50.0)]).unwrap()
+        profile_of(&[(-10.0, 100.0), (-2.0, 100.0), (0.0, 10.0), (3.0, 50.0)]).unwrap()
     }
 
     #[test]
@@ -230,7 +259,7 @@ mod tests {
 
     #[test]
     fn points_that_make_no_profile_are_refused() {
-        let new = SpeedProfile::new;
+        let new = profile_of;
         assert_eq!(new(&[(0.0, 1.0)]), Err(ProfileError::Short { nodes: 1 }));
         assert!(matches!(new(&[(0.0, 1.0), (0.0, 1.0)]), Err(ProfileError::Order { at: 2, .. })));
         assert!(matches!(new(&[(0.0, -1.0), (1.0, 1.0)]), Err(ProfileError::Speed { at: 1, .. })));

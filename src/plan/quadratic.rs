@@ -7,6 +7,24 @@ use clarabel::solver::{
 };
 use nalgebra::{DMatrix, DVector};
 
+/// A quadratic function ½·xᵀPx + qᵀx.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quadratic {
+    /// P.
+    pub hessian: DMatrix<f64>,
+    /// q.
+    pub gradient: DVector<f64>,
+}
+
+/// A term value·x(column) of a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Term {
+    /// Which unknown.
+    pub column: usize,
+    /// What it is multiplied with.
+    pub value: f64,
+}
+
 /// Rows A·x ≤ bound, as (row, column, value).
 #[derive(Debug, Clone, Default)]
 pub struct Rows {
@@ -17,8 +35,8 @@ pub struct Rows {
 
 impl Rows {
     /// Adds Σ value·x(column) ≤ bound.
-    pub fn at_most(&mut self, terms: impl IntoIterator<Item = (usize, f64)>, bound: f64) {
-        for (column, value) in terms {
+    pub fn at_most(&mut self, terms: impl IntoIterator<Item = Term>, bound: f64) {
+        for Term { column, value } in terms {
             self.places.0.push(self.bounds.len());
             self.places.1.push(column);
             self.values.push(value);
@@ -27,8 +45,9 @@ impl Rows {
     }
 }
 
-/// The least of ½·xᵀPx + qᵀx under the rows; `None` where the solver finds none.
-pub fn least(p: &DMatrix<f64>, q: &DVector<f64>, rows: Rows) -> Option<DVector<f64>> {
+/// The least of a function under the rows; `None` where the solver finds none.
+pub fn least(function: &Quadratic, rows: Rows) -> Option<DVector<f64>> {
+    let Quadratic { hessian: p, gradient: q } = function;
     let unknowns = q.len();
     let upper = upper_triangle(p);
     let count = rows.bounds.len();

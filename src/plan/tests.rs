@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
+use super::profile::profile_of;
 use super::*;
 use crate::extruder::limits::CommandLimits;
 use crate::numeric::lti::TransferFunction;
@@ -49,7 +50,7 @@ fn keeps_its_limits(plan: &Plan, nominal: &SpeedProfile, most_s: f64) {
         assert!((0.0..=10.0).contains(&pair[1]), "{pair:?}");
         assert!((pair[1] - pair[0]).abs() <= 20.0 * Plan::EVERY_S + 1e-9, "{pair:?}");
     }
-    assert!(Plan::EVERY_S * super::extruder::float(plan.command.len()) >= plan.speed.duration_s());
+    assert!(Plan::EVERY_S * super::flow::float(plan.command.len()) >= plan.speed.duration_s());
     assert!(plan.added_s >= -1e-9 && plan.added_s <= most_s + 1e-9, "{}", plan.added_s);
     assert!((plan.speed.duration_s() - nominal.duration_s() - plan.added_s).abs() < 1e-9);
 }
@@ -105,7 +106,7 @@ fn the_same_job_has_the_same_plan() {
 #[test]
 fn a_speed_that_the_drive_cannot_feed_is_refused() {
     let extruder = extruder();
-    let nominal = SpeedProfile::new(&[(0.0, 150.0), (100.0, 150.0)]).unwrap();
+    let nominal = profile_of(&[(0.0, 150.0), (100.0, 150.0)]).unwrap();
     let error = solve(&task(&extruder, 1.0), &nominal).unwrap_err();
     assert!(matches!(error, PlanError::Drive { command, .. } if (command - 11.25).abs() < 1e-9));
     let error = solve(&task(&extruder, f64::NAN), &path(&[], 10.0, false)).unwrap_err();
@@ -115,7 +116,7 @@ fn a_speed_that_the_drive_cannot_feed_is_refused() {
 #[test]
 fn a_nominal_speed_that_jumps_is_taken_as_fast_as_the_robot_can() {
     let extruder = extruder();
-    let nominal = SpeedProfile::new(&[(0.0, 100.0), (200.0, 100.0), (200.1, 20.0), (400.0, 20.0)]);
+    let nominal = profile_of(&[(0.0, 100.0), (200.0, 100.0), (200.1, 20.0), (400.0, 20.0)]);
     let plan = solve(&task(&extruder, 1.0), &nominal.unwrap()).unwrap();
     let nodes = plan.speed.path().iter().zip(plan.speed.squares());
     for ((s0, b0), (s1, b1)) in nodes.clone().zip(nodes.skip(1)) {

@@ -1,7 +1,7 @@
 //! A screw that fills and empties: the plant of Diagne et al. 2015, eqs. (13),
 //! (16) and (17), with all that is on its way from the feed to the plug.
 
-use crate::extruder::screw::history::FeedHistory;
+use crate::extruder::screw::feed_history::FeedHistory;
 use crate::extruder::screw::{Conveying, Screw};
 
 /// How the plant is integrated.

@@ -10,7 +10,7 @@ pub mod run;
 pub mod table;
 
 use crate::core::units::Mm;
-use crate::extruder::screw::law::Setpoint;
+use crate::extruder::screw::feedback::Setpoint;
 use crate::extruder::screw::{
     FillLaw, PiecewiseExponential, Pulsation, Saturated, Screw, ScrewDesign, ScrewError, TurnUnit,
 };

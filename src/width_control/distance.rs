@@ -1,29 +1,28 @@
-//! Width by distance: every width is held against the speed at which that piece
-//! of bead was laid, and the speed is set at which the next piece comes out as
-//! wanted.
+//! Width control by distance: every width is compared with the speed at which that piece of
+//! bead was laid, and the speed is set at which the next piece gets the wanted width.
 //!
-//! The bead is w = A·(v/v₀)^−b. What the camera sees now was laid a fixed
-//! *distance* ago, whatever the speed has been since, so that no dead time
-//! stands between a width and the speed that it tells about:
+//! The bead is w = A·(v/v₀)^−b. The camera sees bead that was laid a fixed *distance*
+//! earlier, whatever the speed has been since, so that no dead time lies between a width and
+//! the speed that it belongs to:
 //!
 //! ```text
-//! reports ─▶ trail ─┐ speed where the bead under the camera was laid
-//! width ± σ ────────┴▶ pairing ─▶ pulsation ─▶ change ─▶ level (ln A, b) ─▶ speed
-//!                        └─▶ offset (where the camera really looks)
+//! reports ─▶ speed history ─┐ speed where the bead under the camera was laid
+//! width ± σ ────────────────┴▶ sample ─▶ pulsation ─▶ flow change ─▶ width model (ln A, b) ─▶ speed
+//!                                └─▶ offset estimate (where the camera really looks)
 //! ```
 //!
-//! There are no gains: how much a width moves the estimate follows from its own
-//! standard deviation and from how much the flow is said to drift.
+//! There are no gains: how much a width moves the estimate follows from its own standard
+//! deviation and from the drift of the flow that the cell states.
 
-mod change;
-mod colour;
-mod level;
-mod offset_belief;
-mod pairing;
+mod autocorrelation;
+mod flow_change;
+mod harmonic;
+mod offset_estimate;
 mod pulsation;
-mod tone;
-mod trail;
-mod trust;
+mod sample;
+mod speed_history;
+mod validation;
+mod width_model;
 
 #[cfg(test)]
 mod tests;
@@ -33,14 +32,14 @@ use serde::{Deserialize, Serialize};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
 
-use change::Changes;
-use colour::Colour;
-use level::{Level, Surprise};
-use offset_belief::OffsetBelief;
-use pairing::{Pairing, Unrest};
+use autocorrelation::Colour;
+use flow_change::Changes;
+use offset_estimate::OffsetBelief;
 use pulsation::Pulsation;
-use trail::Trail;
-use trust::Trust;
+use sample::{GaugeInterval, Measured, Pairing, Unrest};
+use speed_history::Trail;
+use validation::Trust;
+use width_model::{Level, Surprise};
 
 /// What the law has to know of its cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,6 +60,15 @@ pub struct DistanceSettings {
     /// How far the flow wanders along a metre of path, as a share: standard
     /// deviation, growing with the root of the way.
     pub drift_per_root_m: f64,
+}
+
+/// A width as the camera gives it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredWidth {
+    /// Mean width over the gauge.
+    pub width: Mm,
+    /// Its standard deviation.
+    pub sigma: Mm,
 }
 
 /// What became of a width.
@@ -166,15 +174,16 @@ impl ByDistance {
         self.trail.report(at.secs(), path.get(), speed.get(), flow_share);
     }
 
-    /// A width and its standard deviation, of a frame that was captured with the
-    /// nozzle at `nozzle_path`, and the width that had been wanted there.
+    /// A width of a frame that was captured with the nozzle at `nozzle_path`, and the width
+    /// that had been wanted there.
     pub fn measured(
         &mut self,
         nozzle_path: Mm,
-        (width, sigma): (Mm, Mm),
+        measured: MeasuredWidth,
         wanted: Mm,
     ) -> DistanceTrace {
         self.watch_the_trail(nozzle_path.get());
+        let MeasuredWidth { width, sigma } = measured;
         let taken = match self.pair(nozzle_path.get(), width.get(), sigma.get()) {
             Some(pairing) => self.take(&pairing, nozzle_path.get(), wanted.get()),
             None => Use::NotPaired,
@@ -235,11 +244,13 @@ impl ByDistance {
             return None;
         }
         let offset = self.settings.offset.get();
-        let place = self.place(nozzle_path);
-        let doubt = DOUBTS * self.offset.sigma() * offset;
-        let exponent = self.level.exponent();
-        let gauge = self.settings.gauge.get();
-        Pairing::of(&self.trail, (place, gauge), (width, sigma), (doubt, exponent))
+        let gauge = GaugeInterval {
+            centre_mm: self.place(nozzle_path),
+            length_mm: self.settings.gauge.get(),
+            centre_tolerance_mm: DOUBTS * self.offset.sigma() * offset,
+        };
+        let measured = Measured { width_mm: width, sigma_mm: sigma };
+        Pairing::of(&self.trail, gauge, measured, self.level.exponent())
     }
 
     fn take(&mut self, seen: &Pairing, nozzle_path: f64, wanted: f64) -> Use {
@@ -248,7 +259,7 @@ impl ByDistance {
         let drift = self.drift_per_mm() * self.level.way_to(pairing.place_mm);
         let swing = self.pulsation.at(pairing.laid_s);
         let (gauge, offset) = (self.settings.gauge.get(), self.settings.offset.get());
-        let look = offset_belief::Sight {
+        let look = offset_estimate::Sight {
             nozzle_path,
             offset,
             gauge,
@@ -263,11 +274,11 @@ impl ByDistance {
         let plain = pairing.ln_width + self.level.exponent() * pairing.ln_speed;
         let hanging = seen.noise * self.colour.hanging() + seen.doubt * seen.doubt;
         self.pulsation.take(pairing.laid_s, plain, hanging + UNSURE * spread, drift);
-        self.weigh(pairing, pairing.ln_width - swing, (libm::log(wanted.max(1e-3)), drift))
+        self.weigh(pairing, pairing.ln_width - swing, libm::log(wanted.max(1e-3)), drift)
     }
 
     /// Takes a width that has been freed of the pulsation, or leaves it.
-    fn weigh(&mut self, pairing: &Pairing, ln_width: f64, (ln_wanted, drift): (f64, f64)) -> Use {
+    fn weigh(&mut self, pairing: &Pairing, ln_width: f64, ln_wanted: f64, drift: f64) -> Use {
         let before = self.level;
         let sight = self.changes.sight(pairing, ln_width);
         let surprise = self.level.surprise(&sight);
@@ -280,7 +291,7 @@ impl ByDistance {
         self.changes.push(pairing, ln_width, before, calm);
         self.unrest.note(pairing.laid_s, surprise, pairing.variance() / surprise.variance);
         self.trust.note(pairing, surprise, ln_wanted, drift);
-        if let Some(before) = self.changes.undone(pairing, (ln_width, surprise), drift) {
+        if let Some(before) = self.changes.undone(pairing, ln_width, surprise, drift) {
             self.pulsation.shift(before.ln_width() - self.level.ln_width(), 0.0);
             self.level = before;
             return Use::Taken;

@@ -21,6 +21,15 @@ pub struct Knot {
     pub width: Mm,
 }
 
+/// A piece of the bead, by path length from where the bead begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BeadSegment {
+    /// Where it begins.
+    pub from: Mm,
+    /// Where it ends.
+    pub to: Mm,
+}
+
 /// Layers, told by the robot's z.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layers {
@@ -96,7 +105,8 @@ impl Target {
     }
 
     /// Mean width over a stretch of the bead.
-    pub fn over(&self, z: Mm, (from, to): (Mm, Mm)) -> Mm {
+    pub fn over(&self, z: Mm, stretch: BeadSegment) -> Mm {
+        let BeadSegment { from, to } = stretch;
         let length = to - from;
         if self.along.is_empty() || length <= Mm::ZERO {
             return self.at(z, from);
@@ -158,7 +168,8 @@ mod tests {
     #[test]
     fn the_mean_over_a_stretch_is_that_of_its_pieces() {
         let target = stepped();
-        let over = |from, to| target.over(Mm::ZERO, (mm(from), mm(to))).get();
+        let over =
+            |from, to| target.over(Mm::ZERO, BeadSegment { from: mm(from), to: mm(to) }).get();
         assert!((over(90.0, 110.0) - 0.5 * (42.0 + 40.1)).abs() < 1e-9);
         assert!((over(250.0, 350.0) - 0.5 * (43.5 + 44.0)).abs() < 1e-9);
         assert_eq!(over(10.0, 10.0), 42.0);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::behaviour::wrong_file;
 use crate::assembly::error::AssemblyError;
 use crate::cell::file::{ExtruderPart, RunPart};
-use crate::extruder::trajectory::PlannedJob;
+use crate::extruder::trajectory::{self, PlannedJob};
 use crate::io::record::ExtruderFile;
 
 /// How far the section of a plan may lie from the cell's, as a share.
@@ -23,7 +23,7 @@ pub fn plan(
     file: &ExtruderFile,
 ) -> Result<Arc<PlannedJob>, AssemblyError> {
     let wrong = |what: String| wrong_file(file, &what);
-    let job = PlannedJob::parse(&file.text).map_err(|error| wrong(error.to_string()))?;
+    let job = trajectory::read(&file.text).map_err(|error| wrong(error.to_string()))?;
     let unit = part.extruder.drive.unit();
     if job.unit != unit {
         return Err(wrong(format!(

@@ -7,7 +7,7 @@ use crate::core::time::Span;
 use crate::core::units::Mm2;
 use crate::document::Table;
 use crate::extruder::adaptive::{Adaptation, AdaptiveLaw, Gains, Safety, ScalarPlant};
-use crate::extruder::law::NozzleModel;
+use crate::extruder::strategy::NozzleModel;
 
 /// The adaptive controller of a nozzle, and that nozzle.
 #[derive(Debug, Clone, Copy, PartialEq)]

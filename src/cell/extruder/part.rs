@@ -6,7 +6,7 @@ use std::path::Path;
 use super::{Extruder, ExtruderPlant, PlantKind, Strategy};
 use crate::core::units::{Mm, Mm3PerS, MmPerS};
 use crate::document::Table;
-use crate::extruder::law::Need;
+use crate::extruder::strategy::Need;
 use crate::extruder::{Drive, FlowDemand};
 use crate::scenario::table::Simulation;
 

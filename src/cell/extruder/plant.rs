@@ -6,10 +6,10 @@ use super::screw::read_screw;
 use crate::core::time::Span;
 use crate::core::units::Rpm;
 use crate::document::Table;
-use crate::extruder::law::Need;
 use crate::extruder::pressure::Fopdt;
 use crate::extruder::rheology::PowerLaw;
 use crate::extruder::screw::{Screw, ScrewDesign};
+use crate::extruder::strategy::Need;
 use crate::numeric::lti::TransferFunction;
 
 const ANY: std::ops::RangeInclusive<f64> = -1e12..=1e12;

@@ -3,13 +3,13 @@
 
 use super::context::About;
 use crate::document::Table;
-use crate::extruder::law::{PressureChoice, PressureSettings};
 use crate::extruder::pressure::Fopdt;
 use crate::extruder::pressure::kalman::Noise;
 use crate::extruder::pressure::pi::PiGains;
 use crate::extruder::pressure::tuning::Tuning;
 use crate::extruder::pressure::vsfc::VsfcGains;
 use crate::extruder::rheology::PowerLaw;
+use crate::extruder::strategy::{PressureChoice, PressureSettings};
 
 /// The laws remember as many commands a second.
 const MOST_HZ: f64 = 250.0;

@@ -7,7 +7,7 @@ use crate::core::units::{Mm, Rpm};
 use crate::document::Table;
 use crate::extruder::screw::control::{Scheme, ScrewSettings};
 use crate::extruder::screw::feasible::Feasibility;
-use crate::extruder::screw::law::Setpoint;
+use crate::extruder::screw::feedback::Setpoint;
 use crate::extruder::screw::{
     FillLaw, PiecewiseExponential, Pulsation, Saturated, Screw, ScrewDesign, TurnUnit,
 };

@@ -11,9 +11,9 @@ use crate::core::time::Span;
 use crate::document::Table;
 use crate::extruder::Drive;
 use crate::extruder::feedforward::{RightZeros, ScrewSpeed};
-use crate::extruder::law::PressureSettings;
 use crate::extruder::rheology::DragFlow;
 use crate::extruder::screw::control::ScrewSettings;
+use crate::extruder::strategy::PressureSettings;
 use crate::identify::library::{TOLERANCE_C, Wanted};
 
 /// How commands are found.

@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::core::units::{Mm2, Rpm};
-use crate::extruder::law::{Constant, Played};
+use crate::extruder::strategy::{Constant, Played};
 use crate::extruder::{
     CommandLimits, Drive, ExtruderCommand, ExtruderFault, ExtruderHold, ExtruderReport,
     ExtruderState, Follows, Law, PumpMode, RobotFollows,
@@ -210,8 +210,7 @@ bead,time_s,path_mm,speed_mm_per_s,command_rpm,flow_mm3_per_s
 
 fn planned() -> Cell {
     let (setup, demand) = rig(Law::Constant(Constant(30.0)));
-    let plan =
-        Some(std::sync::Arc::new(crate::extruder::trajectory::PlannedJob::parse(PLAN).unwrap()));
+    let plan = Some(std::sync::Arc::new(crate::extruder::trajectory::read(PLAN).unwrap()));
     let mut cell = Cell::new(Law::Constant(Constant(30.0)));
     // The test puts the robot elsewhere, which no real one does: its speed jumps, too.
     let limits = Limits {

@@ -127,17 +127,12 @@ pub struct Kalman {
     noise: Noise,
     estimate: f64,
     variance: f64,
-    /// Mean square of the innovations, forgotten over some hundred readings.
-    innovation: Option<f64>,
 }
-
-/// Share that a new innovation has in their mean square.
-const SHARE: f64 = 0.01;
 
 impl Kalman {
     /// Starts at a pressure that is known as well as a reading.
     pub fn new(noise: Noise, pressure: MPa) -> Self {
-        Self { noise, estimate: pressure.get(), variance: noise.reading, innovation: None }
+        Self { noise, estimate: pressure.get(), variance: noise.reading }
     }
 
     /// Takes a reading, and gives the pressure \[MPa\].
@@ -145,9 +140,6 @@ impl Kalman {
         let predicted = self.variance + self.noise.wander;
         let gain = predicted / (predicted + self.noise.reading);
         let innovation = reading.get() - self.estimate;
-        let square = innovation * innovation;
-        let last = self.innovation.unwrap_or(square);
-        self.innovation = Some(last + SHARE * (square - last));
         self.estimate += gain * innovation;
         self.variance = (1.0 - gain) * predicted;
         self.estimate
@@ -156,18 +148,6 @@ impl Kalman {
     /// The pressure \[MPa\].
     pub const fn pressure(&self) -> f64 {
         self.estimate
-    }
-
-    /// Variance of the innovations as they came \[MPa²\]; none before the
-    /// first. Far from [`Self::foretold_innovation`] the noise is another than
-    /// was set.
-    pub const fn innovation(&self) -> Option<f64> {
-        self.innovation
-    }
-
-    /// Variance that the innovations should have with this noise \[MPa²\].
-    pub fn foretold_innovation(&self) -> f64 {
-        self.variance + self.noise.wander + self.noise.reading
     }
 }
 
@@ -209,18 +189,6 @@ mod tests {
         assert!((found.reading / R - 1.0).abs() < 0.04, "{found:?}");
         assert!((found.wander / Q - 1.0).abs() < 0.08, "{found:?}");
         assert!((found.sigma().get() - 0.007_06).abs() < 3e-4);
-    }
-
-    #[test]
-    fn innovations_show_whether_the_noise_is_the_one_that_was_set() {
-        for (times, least, most) in [(1.0, 0.8, 1.25), (4.0, 2.0, 5.0)] {
-            let mut kalman = Kalman::new(Noise::new(Q, R).unwrap(), MPa::constant(0.6));
-            for reading in readings(Q, R * times, 2000) {
-                kalman.step(reading);
-            }
-            let ratio = kalman.innovation().unwrap() / kalman.foretold_innovation();
-            assert!((least..most).contains(&ratio), "{times}: {ratio}");
-        }
     }
 
     #[test]

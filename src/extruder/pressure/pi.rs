@@ -2,7 +2,7 @@
 //! command is led back into the integral (Åström and Hägglund 2006, 3.5). What
 //! Ma et al. 2026 compare their law with.
 
-use super::calls::{Calls, Running, sane};
+use super::call_times::{Calls, Running, sane};
 use super::kalman::{Kalman, Noise};
 use super::{Command, PressureError, PressureLaw, Refused, within};
 use crate::core::time::Stamp;

@@ -1,15 +1,15 @@
 //! This program's own law. Two degrees of freedom: a reference that lags
 //! behind the target, driven through the inverse of the model, and feedback on
 //! the pressure that is foretold a dead time ahead. Load and errors of the
-//! model are observed together ([`super::bank`]), so that neither is mistaken
+//! model are observed together ([`super::multiple_model`]), so that neither is mistaken
 //! for the other; corrections within the noise are made in part
-//! ([`super::zone`]); on its way to a target what the pressure *may* be is kept
+//! ([`super::dead_zone`]); on its way to a target what the pressure *may* be is kept
 //! from passing it. Nothing is integrated in the law, so nothing winds up: the
 //! observer is told what was commanded, limits and all.
 
-use super::bank::{Bank, Foretold};
-use super::calls::{Calls, Running};
-use super::history::CommandHistory;
+use super::call_times::{Calls, Running};
+use super::command_history::CommandHistory;
+use super::multiple_model::{Bank, Foretold};
 use super::reference::{Reference, Way};
 use super::tuning::Tuning;
 use super::{Command, Fopdt, PressureLaw, Refused};
@@ -57,11 +57,6 @@ impl Predictive {
     /// The dead time as far as it is known \[s\].
     pub fn dead_time_s(&self) -> f64 {
         self.bank.dead_s()
-    }
-
-    /// How many steps of the load have been taken for real.
-    pub const fn jumps(&self) -> u64 {
-        self.bank.jumps()
     }
 
     /// The drive \[MPa\] that brings a foretold pressure to another in the time

@@ -1,7 +1,7 @@
 //! The way that the pressure is to take to its target: a first-order lag, whose
 //! inverse through the model is known exactly from command to command.
 
-use super::calls::Running;
+use super::call_times::Running;
 
 /// What is taken for the time between commands before the first two are known
 /// \[s\]: the paper's 20 Hz.

@@ -2,8 +2,8 @@
 //! foretells: the pressure that is read, less what the commands under way have
 //! not yet done to it. Ma et al. 2026, eq. (8).
 
-use super::calls::{Calls, Running};
-use super::history::CommandHistory;
+use super::call_times::{Calls, Running};
+use super::command_history::CommandHistory;
 use super::kalman::{Kalman, Noise};
 use super::pi::{PiGains, PiMemory};
 use super::reference::Reference;

@@ -13,8 +13,8 @@
 //! | tunnel | 0.3 within 5·σ, all from 10·σ | a drift within the noise moves the screw little; at most 3.5·σ of it stay in the pressure |
 //! | caution | 1.45 standard deviations, 2·σ beyond the target | on its way to a target the pressure that may be there, not only the likeliest, is kept from passing it |
 
+use super::dead_zone::Zone;
 use super::kalman::Noise;
-use super::zone::Zone;
 use super::{Fopdt, PressureError, within};
 
 /// Settings of the predictive law.

@@ -2,7 +2,7 @@
 //! feedforward, as Ma et al. 2026, eqs. (6) to (10): the integral rests while
 //! the error is within the noise, creeps in a zone around it, and works beyond.
 
-use super::calls::{Calls, Running, sane};
+use super::call_times::{Calls, Running, sane};
 use super::kalman::{Kalman, Noise};
 use super::reference::FIRST_S;
 use super::smith::Smith;

@@ -4,13 +4,12 @@
 use super::error::{ScrewError, positive};
 use super::euler::{Euler, whole};
 use super::exact::{Exact, Overtaken, Prediction};
-use super::history::FeedHistory;
-use super::law::FillLaw;
-use super::model::{Conveying, Screw};
+use super::feed_history::FeedHistory;
+use super::feedback::FillLaw;
+use super::model::{Conveying, MM_PER_M, Screw};
 use crate::core::time::{Span, Stamp};
 use crate::core::units::Mm;
 
-const MM_PER_M: f64 = 1000.0;
 /// Most changes of the feed that are remembered.
 const MOST_STEPS: usize = 1 << 16;
 

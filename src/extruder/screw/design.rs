@@ -4,10 +4,8 @@
 use std::f64::consts::TAU;
 
 use super::error::{ScrewError, positive};
-use super::model::{Conveying, Pulsation, Screw};
+use super::model::{Conveying, MM_PER_M, Pulsation, Screw};
 use crate::core::units::{Mm, Rpm};
-
-const MM_PER_M: f64 = 1000.0;
 
 /// What the screw's speed is multiplied with the pitch in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -93,7 +93,7 @@ pub(super) fn whole(steps: f64) -> usize {
 mod tests {
     use super::*;
     use crate::extruder::screw::exact::Exact;
-    use crate::extruder::screw::history::FeedHistory;
+    use crate::extruder::screw::feed_history::FeedHistory;
     use crate::extruder::screw::{Pulsation, ScrewDesign};
 
     #[test]

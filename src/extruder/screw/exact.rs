@@ -9,7 +9,7 @@
 //! changes: of fourth order, or of second where the feed changes so often that
 //! the steps are shorter than that needs.
 
-use super::history::{FeedHistory, Piece};
+use super::feed_history::{FeedHistory, Piece};
 use super::model::{Conveying, Screw};
 
 /// What is foretold.
@@ -114,8 +114,14 @@ struct Ahead<'a> {
     screw: &'a Screw,
     plug: f64,
     past_s: f64,
-    cos: f64,
+    phase: Phase,
+}
+
+/// Sine and cosine of the pulsation's phase.
+#[derive(Clone, Copy)]
+struct Phase {
     sin: f64,
+    cos: f64,
 }
 
 /// Rates of the plug and of the time of arrival for each second of feeding.
@@ -129,14 +135,14 @@ impl<'a> Ahead<'a> {
     fn new(screw: &'a Screw, now_s: f64, plug: f64) -> Self {
         let pulsation = screw.pulsation;
         let (sin, cos) = libm::sincos(pulsation.rad_per_s * now_s + pulsation.phase_rad);
-        Self { screw, plug, past_s: 0.0, cos, sin }
+        Self { screw, plug, past_s: 0.0, phase: Phase { sin, cos } }
     }
 
     /// Over a stretch of held feed.
     fn follow(&mut self, piece: Piece) -> Result<(), Overtaken> {
         let mut left = piece.length;
         while left > 0.0 {
-            let first = self.rates(piece.fill, (self.sin, self.cos), self.plug)?;
+            let first = self.rates(piece.fill, self.phase, self.plug)?;
             let turn = self.screw.pulsation.rad_per_s * first.time;
             let step = left.min(STEP_S).min(STEP_RAD / turn);
             // What would be left by rounding is taken along.
@@ -149,7 +155,7 @@ impl<'a> Ahead<'a> {
             let past_s = step * mean.time;
             self.plug = (self.plug + step * mean.plug).min(self.screw.length_m);
             self.past_s += past_s;
-            (self.sin, self.cos) = self.turned(past_s);
+            self.phase = self.turned(past_s);
             left -= step;
         }
         Ok(())
@@ -177,7 +183,8 @@ impl<'a> Ahead<'a> {
     /// are multiplied with (1 + θ2·P)(1 − U), which is 1/(1 − Γ), and with
     /// θ1·(1 + ε·cos)².
     #[inline]
-    fn rates(&self, fill: f64, (sin, cos): (f64, f64), plug: f64) -> Result<Rates, Overtaken> {
+    fn rates(&self, fill: f64, phase: Phase, plug: f64) -> Result<Rates, Overtaken> {
+        let Phase { sin, cos } = phase;
         let screw = self.screw;
         let share = screw.pulsation.share;
         let scale = 1.0 + share * cos;
@@ -198,7 +205,7 @@ impl<'a> Ahead<'a> {
     /// Sine and cosine of the pulsation's phase a while later, turned on from
     /// those that are known: by a series, exact to 10⁻¹³, where it is short.
     #[inline]
-    fn turned(&self, past_s: f64) -> (f64, f64) {
+    fn turned(&self, past_s: f64) -> Phase {
         let a = self.screw.pulsation.rad_per_s * past_s;
         let (sin, cos) = if a.abs() <= SHORT_RAD {
             let q = a * a;
@@ -207,7 +214,8 @@ impl<'a> Ahead<'a> {
         } else {
             libm::sincos(a)
         };
-        (self.sin * cos + self.cos * sin, self.cos * cos - self.sin * sin)
+        let now = self.phase;
+        Phase { sin: now.sin * cos + now.cos * sin, cos: now.cos * cos - now.sin * sin }
     }
 }
 
@@ -260,7 +268,7 @@ mod tests {
         for turn in [SHORT_RAD, 0.4] {
             let ahead = Ahead::new(&screw(A), 7.0, 0.1).turned(turn / 3.5);
             let (sin, cos) = libm::sincos(3.5 * 7.0 + turn);
-            assert!((ahead.0 - sin).abs() < 1e-12 && (ahead.1 - cos).abs() < 1e-12);
+            assert!((ahead.sin - sin).abs() < 1e-12 && (ahead.cos - cos).abs() < 1e-12);
         }
     }
 

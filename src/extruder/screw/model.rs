@@ -4,6 +4,9 @@
 
 use super::error::{ScrewError, positive};
 
+/// Millimetres in a metre.
+pub(super) const MM_PER_M: f64 = 1000.0;
+
 /// How the conveying speed pulsates about its mean: c = θ1·(1 + ε·cos(ωt + φ)),
 /// eq. (17).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::core::time::Span;
+use crate::core::units::{Mm3PerS, MmPerS};
 
 const MACHINE: StartStop = StartStop {
     first_flow_s: 0.2,
@@ -100,16 +101,6 @@ fn what_still_comes_after_a_stop_is_what_the_rest_of_the_bead_needs() {
         let all = 400.0 * MACHINE.after_stop_s();
         assert!((laid + stop.left_mm3() - all).abs() < 0.05, "{laid} {all}");
     }
-}
-
-#[test]
-fn the_robot_waits_until_no_more_than_that_may_drip() {
-    let stop = timing(0.1).stop();
-    let waits = stop.waits(1.0).secs();
-    let left = 400.0 * (MACHINE.after_stop_s() - MACHINE.fallen_s(stop.lasts().secs() + waits));
-    assert!((left - 1.0).abs() < 1e-6, "{left}");
-    assert_eq!(stop.waits(stop.left_mm3() + 1.0), Span::ZERO);
-    assert!(stop.waits(0.0).secs() < 60.0);
 }
 
 #[test]

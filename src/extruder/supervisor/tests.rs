@@ -1,6 +1,6 @@
 use super::*;
 use crate::core::units::Rpm;
-use crate::extruder::law::{Constant, Played};
+use crate::extruder::strategy::{Constant, Played};
 use crate::extruder::{ExtruderFault, ExtruderHold, PumpMode};
 use crate::identify::profile::{Point, Profile};
 

@@ -4,9 +4,9 @@ use super::{Obedience, Phase, Supervisor};
 use crate::core::readback::Verdict;
 use crate::core::time::{Span, Stamp};
 use crate::extruder::Drive;
-use crate::extruder::law::Need;
 use crate::extruder::report::{ExtruderReport, PumpMode};
 use crate::extruder::state::{ExtruderFault, ExtruderHold};
+use crate::extruder::strategy::Need;
 
 /// Share of the highest pressure below which it has fallen.
 const FALLEN: f64 = 0.95;

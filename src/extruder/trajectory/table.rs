@@ -1,8 +1,6 @@
 //! The table of a plan, `plan.csv`.
 
-use std::sync::Arc;
-
-use super::{PlannedCourse, PlannedJob, Row};
+use super::job::{PlannedJob, Row};
 use crate::core::quantity::Unit;
 use crate::document::csv::{LineProblem, in_words};
 
@@ -108,7 +106,8 @@ impl Columns {
     }
 }
 
-/// Reads a plan.
+/// Reads a job's plan from the text of a `plan.csv`. Fails where a column, a number or the
+/// order of the rows is not as `truebead plan` writes it.
 pub fn read(text: &str) -> Result<PlannedJob, TableError> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let of_row = |error: csv::Error| {
@@ -136,8 +135,7 @@ pub fn read(text: &str) -> Result<PlannedJob, TableError> {
     if beads.is_empty() || beads.iter().any(|(_, rows)| rows.len() < 2) {
         return Err(TableError::Short);
     }
-    let course = |(_, rows)| Arc::new(PlannedCourse { rows });
-    Ok(PlannedJob { unit, beads: beads.into_iter().map(course).collect() })
+    Ok(PlannedJob::new(unit, beads.into_iter().map(|(_, rows)| rows).collect()))
 }
 
 fn wrong(line: u64, column: &str, found: f64, expected: &'static str) -> TableError {

@@ -1,6 +1,9 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 use super::*;
+use crate::core::quantity::Unit;
+use crate::core::time::Span;
+use crate::core::units::Mm;
 
 /// 100 mm/s for a second, down to 20 mm/s within a second, then 20 mm/s for a second.
 fn text() -> String {
@@ -23,7 +26,7 @@ fn text() -> String {
 
 #[test]
 fn a_plan_is_read_by_place_and_goes_on_at_its_ends() {
-    let job = PlannedJob::parse(&text()).unwrap();
+    let job = read(&text()).unwrap();
     assert_eq!((job.unit, job.beads().len()), (Unit::Rpm, 2));
     let close = |found: f64, expected: f64| {
         assert!((found - expected).abs() < 1e-3, "{found} {expected}");
@@ -49,7 +52,7 @@ fn a_plan_is_read_by_place_and_goes_on_at_its_ends() {
 
 #[test]
 fn the_speed_of_a_setpoint_is_the_mean_over_its_time() {
-    let job = PlannedJob::parse(&text()).unwrap();
+    let job = read(&text()).unwrap();
     let speed =
         |path: f64, lasts: f64| job.bead(0).speed(Mm::constant(path), Span::from_secs(lasts)).get();
     let close = |found: f64, expected: f64| {
@@ -65,9 +68,8 @@ fn the_speed_of_a_setpoint_is_the_mean_over_its_time() {
 
 #[test]
 fn what_is_no_plan_is_refused_with_its_line() {
-    let refused = |from: &str, to: &str| {
-        PlannedJob::parse(&text().replacen(from, to, 1)).unwrap_err().to_string()
-    };
+    let refused =
+        |from: &str, to: &str| read(&text().replacen(from, to, 1)).unwrap_err().to_string();
     assert!(refused("path_mm,", "way,").contains("no column path_mm"));
     assert!(refused("command_rpm", "screw").contains("nothing for the command"));
     assert!(refused("command_rpm", "command_apples").contains("command_apples"));
@@ -76,14 +78,14 @@ fn what_is_no_plan_is_refused_with_its_line() {
     let words = refused("1,0.05,5.000000", "1,0.05,1.000000");
     assert!(words.contains("line 7") && words.contains("path_mm"), "{words}");
     let short = text().len() - 40;
-    let words = PlannedJob::parse(&text()[..short]).unwrap_err().to_string();
+    let words = read(&text()[..short]).unwrap_err().to_string();
     assert!(words.contains("cut short"), "{words}");
     let words = refused("1,0.05,", "1,0.03,");
     assert!(words.contains("time_s"), "{words}");
     let words = refused("1,0.00,0.000000", "1,0.00,3.000000");
     assert!(words.contains("line 2") && words.contains("0 where a bead begins"), "{words}");
     assert!(
-        PlannedJob::parse("bead,time_s,path_mm,speed_mm_per_s,command_rpm,flow_mm3_per_s\n")
+        read("bead,time_s,path_mm,speed_mm_per_s,command_rpm,flow_mm3_per_s\n")
             .unwrap_err()
             .to_string()
             .contains("fewer than two rows")

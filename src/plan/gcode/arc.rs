@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::{GcodeError, distance};
+use super::error::GcodeError;
+use crate::plan::position::{Position, distance};
 
 /// Ends of an arc may differ by this much in their distance from the centre, as rounded
 /// numbers do \[mm\], and by this share of it.
@@ -31,6 +32,15 @@ pub enum Move {
     },
 }
 
+/// Where an arc begins and ends \[mm\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ArcEnds {
+    /// Its beginning.
+    pub from: Position,
+    /// Its end.
+    pub to: Position,
+}
+
 /// How the centre of an arc is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Centre {
@@ -44,13 +54,13 @@ impl Move {
     /// An arc to the left or to the right.
     pub fn arc(
         line: usize,
-        (from, to): ([f64; 3], [f64; 3]),
+        ArcEnds { from, to }: ArcEnds,
         given: Centre,
         left: bool,
     ) -> Result<Self, GcodeError> {
         let centre = match given {
             Centre::Beside([i, j]) => [from[0] + i, from[1] + j],
-            Centre::Radius(radius) => by_radius(line, (from, to), radius, left)?,
+            Centre::Radius(radius) => by_radius(line, ArcEnds { from, to }, radius, left)?,
         };
         let arm = |p: [f64; 3]| (p[0] - centre[0], p[1] - centre[1]);
         let ((x0, y0), (x1, y1)) = (arm(from), arm(to));
@@ -120,7 +130,7 @@ impl Move {
 
 fn by_radius(
     line: usize,
-    (from, to): ([f64; 3], [f64; 3]),
+    ArcEnds { from, to }: ArcEnds,
     radius: f64,
     left: bool,
 ) -> Result<[f64; 2], GcodeError> {

@@ -1,8 +1,9 @@
 //! What a line means after the lines before it.
 
-use super::arc::{Centre, Move};
+use super::arc::{ArcEnds, Centre, Move};
+use super::error::GcodeError;
 use super::words::Word;
-use super::{GcodeError, distance};
+use crate::plan::position::distance;
 
 /// Codes that change nothing about the path: the plane XY, no compensation, a work
 /// offset, exact and continuous paths, no cycle, feeds a minute.
@@ -63,13 +64,11 @@ impl State {
     /// Takes a line's words.
     pub fn take(&mut self, line: usize, words: &[Word]) -> Result<Motion, GcodeError> {
         // Units go before the numbers that are in them.
-        for (letter, number) in words {
-            if *letter == 'G' {
-                self.code(line, *number, words)?;
-            }
+        for word in words.iter().filter(|word| word.letter == 'G') {
+            self.code(line, word.number, words)?;
         }
         let mut asked = Asked::default();
-        for (letter, number) in words.iter().copied() {
+        for Word { letter, number } in words.iter().copied() {
             match letter {
                 'X' => asked.axes[0] = Some(number),
                 'Y' => asked.axes[1] = Some(number),
@@ -98,8 +97,8 @@ impl State {
             90.0 => self.relative = false,
             91.0 => self.relative = true,
             // Setting the feeder's own count moves nothing.
-            92.0 if words.iter().all(|(letter, _)| matches!(letter, 'G' | 'E'))
-                && words.iter().any(|(letter, _)| *letter == 'E') => {}
+            92.0 if words.iter().all(|word| matches!(word.letter, 'G' | 'E'))
+                && words.iter().any(|word| word.letter == 'E') => {}
             _ if IDLE.contains(&number) => {}
             _ => return Err(unknown(line, 'G', number)),
         }
@@ -128,7 +127,7 @@ impl State {
             Mode::Line => Move::Line { from, to },
             Mode::Left | Mode::Right => {
                 let centre = self.centre(line, asked)?;
-                Move::arc(line, (from, to), centre, mode == Mode::Left)?
+                Move::arc(line, ArcEnds { from, to }, centre, mode == Mode::Left)?
             }
         };
         Ok(Motion::Laid(moved, self.feed.ok_or(GcodeError::NoFeed { line })?))

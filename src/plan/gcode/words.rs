@@ -1,9 +1,15 @@
 //! A line of G-code as words.
 
-use super::GcodeError;
+use super::error::GcodeError;
 
-/// A letter, in capitals, and its number.
-pub type Word = (char, f64);
+/// A letter and its number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Word {
+    /// The letter, in capitals.
+    pub letter: char,
+    /// The number.
+    pub number: f64,
+}
 
 /// The words of a line without its comments. What stands after `%` or `/` at its start, a
 /// checksum and line numbers are left out.
@@ -29,7 +35,7 @@ pub fn words(line: usize, text: &str) -> Result<Vec<Word>, GcodeError> {
         };
         let letter = letter.to_ascii_uppercase();
         if letter != 'N' {
-            all.push((letter, value));
+            all.push(Word { letter, number: value });
         }
         rest = after.trim_start();
     }
@@ -55,7 +61,8 @@ mod tests {
     #[test]
     fn words_need_no_spaces_and_comments_are_none() {
         let found = words(1, "n10 g1x-1.5 Y+2(over (there)F.5 ; X9").unwrap();
-        assert_eq!(found, [('G', 1.0), ('X', -1.5), ('Y', 2.0), ('F', 0.5)]);
+        let expected = [('G', 1.0), ('X', -1.5), ('Y', 2.0), ('F', 0.5)];
+        assert_eq!(found, expected.map(|(letter, number)| Word { letter, number }));
         assert_eq!(words(1, "% G1 X2").unwrap(), []);
         assert_eq!(words(1, "G1 X2*71").unwrap().len(), 2);
     }

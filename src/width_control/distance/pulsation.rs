@@ -1,7 +1,7 @@
 //! A steady pulsation of pump or screw: pulsations of many periods are believed
 //! in beside each other, and beside none, each as far as the widths bear it out.
 
-use super::tone::Tone;
+use super::harmonic::Tone;
 
 /// Shortest and longest period \[s\].
 const PERIODS_S: (f64, f64) = (0.55, 10.0);

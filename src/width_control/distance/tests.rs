@@ -61,7 +61,8 @@ impl Line {
             let glares = self.glare.filter(|(from, to, _)| (*from..*to).contains(&self.path));
             let seen = glares.map_or(seen, |(_, _, width)| width);
             let (width, sigma) = (Mm::new(seen + noise * random), Mm::new(noise));
-            self.law.measured(path, (width.unwrap(), sigma.unwrap()), Mm::constant(TARGET))
+            let measured = MeasuredWidth { width: width.unwrap(), sigma: sigma.unwrap() };
+            self.law.measured(path, measured, Mm::constant(TARGET))
         });
         let (now, target) = (Stamp::from_secs(self.now_s), Mm::constant(TARGET));
         if self.path >= 200.0
@@ -165,7 +166,7 @@ fn nothing_seen_is_no_speed_and_a_width_without_a_path_is_no_reason() {
     assert_eq!(law.speed(Mm::constant(TARGET), now, span), None);
     let trace = law.measured(
         Mm::constant(100.0),
-        (Mm::constant(40.0), Mm::constant(0.3)),
+        MeasuredWidth { width: Mm::constant(40.0), sigma: Mm::constant(0.3) },
         Mm::constant(42.0),
     );
     assert_eq!(trace.use_of_width, Use::NotPaired);
@@ -199,7 +200,7 @@ fn a_width_that_was_laid_while_the_flow_was_changed_far_says_nothing() {
         let share = (at / 2.0).clamp(0.1, 1.0);
         let path = Mm::new(100.0 * at).unwrap();
         law.reported(Stamp::from_secs(at), path, MmPerS::constant(100.0), share);
-        let width = (Mm::constant(30.0), Mm::constant(0.3));
+        let width = MeasuredWidth { width: Mm::constant(30.0), sigma: Mm::constant(0.3) };
         uses.push(law.measured(path, width, Mm::constant(TARGET)).use_of_width);
     }
     let bead_at = |path: f64| (path + OFFSET) / (100.0 * STEP_S);
@@ -234,7 +235,7 @@ fn the_law_is_the_same_for_a_bead_of_any_width() {
             let [random, _] = hash::normal_pair(hash::mix(&[5, u64::from(k)]));
             let width = times * 40.0 * (f64::powf(laid / 112.5, -0.25) + 0.009 * random);
             let (width, sigma) = (Mm::constant(width), Mm::constant(times * 40.0 * 0.009));
-            let trace = law.measured(Mm::constant(path), (width, sigma), width);
+            let trace = law.measured(Mm::constant(path), MeasuredWidth { width, sigma }, width);
             assert!(law.is_ready());
             seen.push((trace.use_of_width, trace.level_mm.get() / times));
         }
@@ -274,8 +275,8 @@ fn a_speed_that_is_not_reported_exactly_teaches_no_exponent() {
         let reported = MmPerS::constant(112.5 * (1.0 + 0.005 * speed));
         law.reported(at, Mm::constant(path), reported, 1.0);
         if path > OFFSET + GAUGE {
-            let exact = (Mm::constant(38.61), Mm::constant(0.002));
-            let trace = law.measured(Mm::constant(path), exact, exact.0);
+            let exact = MeasuredWidth { width: Mm::constant(38.61), sigma: Mm::constant(0.002) };
+            let trace = law.measured(Mm::constant(path), exact, exact.width);
             assert!((trace.exponent - 0.25).abs() < 0.01, "{k}: {trace:?}");
             assert!((trace.offset_mm.get() - OFFSET).abs() < 0.05 * OFFSET, "{k}: {trace:?}");
         }

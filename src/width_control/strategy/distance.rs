@@ -11,7 +11,7 @@ use crate::document::Table;
 use crate::width_control::controller::{
     BeadReport, Outlook, SpeedRequest, Tracking, WidthController, WidthSample, WidthTrace,
 };
-use crate::width_control::distance::{ByDistance, DistanceSettings, Distrust};
+use crate::width_control::distance::{ByDistance, DistanceSettings, Distrust, MeasuredWidth};
 
 /// Control by distance in a cell.
 pub const REGISTRATION: Registration =
@@ -92,7 +92,7 @@ impl DistanceControl {
             && sample.is_own_bead
         {
             let wanted = sample.width - sample.error;
-            let width = (sample.width, sample.sigma);
+            let width = MeasuredWidth { width: sample.width, sigma: sample.sigma };
             trace.distance = Some(self.by_distance.measured(path, width, wanted));
             self.look_for_fallback(sample.is_path_known);
         }

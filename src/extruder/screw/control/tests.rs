@@ -1,5 +1,5 @@
 use super::*;
-use crate::extruder::screw::law::Setpoint;
+use crate::extruder::screw::feedback::Setpoint;
 use crate::extruder::screw::{PiecewiseExponential, Pulsation, Saturated, ScrewDesign};
 use proptest::prelude::*;
 

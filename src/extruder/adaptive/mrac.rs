@@ -1,0 +1,231 @@
+//! The law of one sub-system: reference model, feedback, estimate.
+
+use nalgebra::Matrix4;
+
+use super::estimate::Estimate;
+use super::gains::{Adaptation, GainError, Gains, Safety, ScalarPlant, check};
+use crate::core::time::Span;
+
+/// Samples that may be missed before the time between two is a gap.
+const GAP: f64 = 4.0;
+
+/// Model-reference adaptive law of a first-order plant (Mohammadi Looey et al.
+/// 2026, eqs. (8)–(10)), sampled.
+///
+/// The reference's part of the command is exact: with the unknown part
+/// compensated, the plant follows the reference model at the samples however
+/// long a command is held. The error's part is the continuous law, with the
+/// estimate led by half a sample ([`Self::step`]).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AdaptiveLaw {
+    plant: ScalarPlant,
+    gains: Gains,
+    hold: Span,
+    /// The plant and the reference model over one held command.
+    state_step: f64,
+    input_step: f64,
+    estimate: Estimate,
+    model: f64,
+    last: Option<Held>,
+}
+
+/// What has been held since the last step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Held {
+    reference: f64,
+    demanded: f64,
+    applied: f64,
+}
+
+/// A command and what it is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Action {
+    /// u: what the input is to be until the next step.
+    pub command: f64,
+    /// Output of the reference model now.
+    pub model: f64,
+    /// e = y − model.
+    pub error: f64,
+    /// Δ̂ now.
+    pub estimate: f64,
+    /// Where the output will be at the end of the hold if Δ̂ is right.
+    pub foretold: f64,
+}
+
+impl AdaptiveLaw {
+    /// A law whose commands are held for `hold`. Fails where reference model
+    /// or error are not stable, in continuous time or at that rate of
+    /// commands, and where a gain has the wrong sign.
+    pub fn new(plant: ScalarPlant, gains: Gains, hold: Span) -> Result<Self, GainError> {
+        check(plant, &gains, hold)?;
+        let (state_step, input_step) = plant.held(hold.secs());
+        let (estimate, model, last) = (Estimate::default(), 0.0, None);
+        let law = Self { plant, gains, hold, state_step, input_step, estimate, model, last };
+        let radius = law.error_radius();
+        if radius < 1.0 {
+            Ok(law)
+        } else {
+            Err(GainError::TooSeldom { hold_s: hold.secs(), radius })
+        }
+    }
+
+    /// Starts in a steady state: the reference model at the measured output,
+    /// and the estimate such that the input that is applied explains why the
+    /// output stands still. The next command at the reference of
+    /// [`Self::reference_for`] this output is that input: no bump.
+    pub fn start(&mut self, measured: f64, applied: f64, known: f64) {
+        let bound = self.gains.safety.bound.unwrap_or(f64::MAX);
+        let needed = -self.plant.state_gain_per_s / self.plant.input_gain * measured;
+        let value = (needed - known - applied).clamp(-bound, bound);
+        self.estimate = Estimate { value, slope_per_s: 0.0, last_error: None };
+        self.model = measured;
+        self.last = None;
+    }
+
+    /// Sets the estimate, as the paper's law that does not adapt is given what
+    /// it knows beforehand.
+    pub fn know(&mut self, uncertainty: f64) {
+        self.estimate.value = uncertainty;
+        self.estimate.slope_per_s = 0.0;
+    }
+
+    /// The reference r that holds the model at an output.
+    pub fn reference_for(&self, output: f64) -> f64 {
+        -self.model_pole() / self.plant.input_gain * output
+    }
+
+    /// One step, `dt` after the last one: measured output y, reference r from
+    /// now on, known part w in the mean over the coming hold. A step after a
+    /// gap (more than four holds) learns nothing and takes the model up again
+    /// at the measured output; a reading that is no number is replaced by the
+    /// model's. What the drive makes of the command is told by
+    /// [`Self::settle`].
+    pub fn step(&mut self, measured: f64, reference: f64, known: f64, dt: Span) -> Action {
+        self.advance_model(dt);
+        let gap = dt.secs() > GAP * self.hold.secs();
+        let seen = measured.is_finite();
+        if gap && seen {
+            self.model = measured;
+            self.estimate.last_error = None;
+        }
+        let error = if seen { measured - self.model } else { 0.0 };
+        if seen && !gap && dt > Span::ZERO && self.last.is_some() {
+            self.estimate.learn(self.plant, &self.gains, error, dt.secs());
+        } else {
+            self.estimate.last_error = seen.then_some(error);
+        }
+        let hold_s = self.hold.secs();
+        let acting = self.estimate.acting(self.plant, &self.gains, error, hold_s);
+        let fed_back = (self.gains.feedback + self.gains.error_feedback) * error;
+        let follow = self.follow(reference);
+        let command = follow - fed_back - known - acting;
+        self.last = Some(Held { reference, demanded: command, applied: command });
+        let output = self.model + error;
+        let foretold = self.state_step * output + self.input_step * (command + known + acting);
+        Action { command, model: self.model, error, estimate: self.estimate.value, foretold }
+    }
+
+    /// Tells what was applied in place of the command. The reference model is
+    /// led by the same difference, so that a limit is no error to learn from.
+    pub fn settle(&mut self, applied: f64) {
+        if let Some(held) = &mut self.last
+            && applied.is_finite()
+        {
+            held.applied = applied;
+        }
+    }
+
+    /// The errors that stay when Δ grows by `slope` a second: of the output,
+    /// c/(γ·p·b), and of the estimate; none where the slope is learnt, infinite
+    /// where nothing is learnt. Without leakage and bounds.
+    pub fn ramp_errors(&self, slope: f64) -> RampErrors {
+        let output = match self.gains.adaptation {
+            Adaptation::Off => slope * f64::INFINITY,
+            Adaptation::Constant { .. } => {
+                slope / self.gains.adaptation.rate(self.plant.input_gain)
+            }
+            Adaptation::Ramp { .. } => 0.0,
+        };
+        let pole = self.plant.pole(self.gains.feedback + self.gains.error_feedback);
+        RampErrors { output, estimate: -pole / self.plant.input_gain * output }
+    }
+
+    /// Time for which a command is held.
+    pub fn hold(&self) -> Span {
+        self.hold
+    }
+
+    /// The plant that the law is made for.
+    pub fn plant(&self) -> ScalarPlant {
+        self.plant
+    }
+
+    /// Δ̂ \[unit of u\].
+    pub fn estimate(&self) -> f64 {
+        self.estimate.value
+    }
+
+    fn model_pole(&self) -> f64 {
+        self.plant.pole(self.gains.feedback)
+    }
+
+    /// The input that takes the plant from the model's output to where the
+    /// model will be after the hold.
+    fn follow(&self, reference: f64) -> f64 {
+        let (kept, driven) = self.model_held(self.hold.secs());
+        let next = kept * self.model + driven * reference;
+        (next - self.state_step * self.model) / self.input_step
+    }
+
+    fn model_held(&self, t_s: f64) -> (f64, f64) {
+        let model = ScalarPlant { state_gain_per_s: self.model_pole(), ..self.plant };
+        model.held(t_s)
+    }
+
+    fn advance_model(&mut self, dt: Span) {
+        if let Some(held) = self.last
+            && dt > Span::ZERO
+        {
+            let (kept, driven) = self.model_held(dt.secs());
+            let missed = self.plant.held(dt.secs()).1 * (held.applied - held.demanded);
+            self.model = kept * self.model + driven * held.reference + missed;
+        }
+    }
+
+    /// Largest eigenvalue of the error from sample to sample.
+    fn error_radius(&self) -> f64 {
+        let hold_s = self.hold.secs();
+        let column = |state: [f64; 4]| {
+            let [error, last, value, slope_per_s] = state;
+            let mut estimate = Estimate { value, slope_per_s, last_error: Some(last) };
+            let free = Gains { safety: Safety { bound: None, ..self.gains.safety }, ..self.gains };
+            estimate.learn(self.plant, &free, error, hold_s);
+            let acting = estimate.acting(self.plant, &free, error, hold_s);
+            let fed_back = (free.feedback + free.error_feedback) * error;
+            let next = self.state_step * error - self.input_step * (fed_back + acting);
+            // A law that does not learn keeps its estimate, which is no mode
+            // of the error.
+            let kept = if free.adaptation == Adaptation::Off { 0.0 } else { estimate.value };
+            [next, error, kept, estimate.slope_per_s]
+        };
+        let mut matrix = Matrix4::zeros();
+        for index in 0..4 {
+            let mut unit = [0.0; 4];
+            unit[index] = 1.0;
+            matrix.set_column(index, &column(unit).into());
+        }
+        if !matches!(self.gains.adaptation, Adaptation::Ramp { .. }) {
+            matrix.column_mut(3).fill(0.0);
+        }
+        matrix.complex_eigenvalues().iter().map(|root| root.norm()).fold(0.0, f64::max)
+    }
+}
+
+/// What a ramp of the uncertainty leaves for good.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RampErrors {
+    /// e∞ \[unit of y\].
+    pub output: f64,
+    /// Δ − Δ̂ \[unit of u\].
+    pub estimate: f64,
+}

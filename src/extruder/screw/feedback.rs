@@ -1,0 +1,266 @@
+//! What to feed at a length of the plug. Both laws give a share of full from 0
+//! to a largest one, and the share that holds the setpoint at the setpoint.
+
+use super::error::{ScrewError, positive};
+use super::model::{MM_PER_M, Screw};
+use crate::core::units::Mm;
+
+/// What is asked of a law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setpoint {
+    /// Wanted length of the plug x*.
+    pub plug: Mm,
+    /// Largest share that can be fed, `v_max`, below 1.
+    pub most: f64,
+}
+
+/// A setpoint that has been checked against a screw, in metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Held {
+    plug_m: f64,
+    length_m: f64,
+    most: f64,
+    /// Share that holds the setpoint.
+    hold: f64,
+}
+
+impl Setpoint {
+    fn check(&self, screw: &Screw) -> Result<Held, ScrewError> {
+        let (plug_m, length_m) = (self.plug.get() / MM_PER_M, screw.length_m);
+        if !(plug_m > 0.0 && plug_m < length_m) {
+            let (setpoint_mm, length_mm) = (self.plug.get(), length_m * MM_PER_M);
+            return Err(ScrewError::Setpoint { setpoint_mm, length_mm });
+        }
+        let hold = screw.holding(plug_m);
+        if !(self.most > hold && self.most < 1.0) {
+            return Err(ScrewError::Most { most: self.most, needed: hold });
+        }
+        Ok(Held { plug_m, length_m, most: self.most, hold })
+    }
+
+    /// Flattest slope at the setpoint for which the exponentials bend towards
+    /// it from both sides, `S_min` \[1/m\]: eq. (31) without its leading x*.
+    pub fn least_slope(&self, screw: &Screw) -> Result<f64, ScrewError> {
+        self.check(screw).map(|held| held.least_slope())
+    }
+}
+
+impl Held {
+    fn least_slope(&self) -> f64 {
+        let left = (self.most - self.hold) / self.plug_m;
+        left.max(self.hold / (self.length_m - self.plug_m))
+    }
+}
+
+/// The positive solution a of a·height = slope·(1 − e^(−a·width)), eqs. (32)
+/// and (33), for a slope above height/width. The difference of both sides is
+/// convex and positive at slope/height, so that Newton's method falls on the
+/// solution from there without a detour.
+fn gain(slope: f64, height: f64, width: f64) -> f64 {
+    let mut a = slope / height;
+    for _ in 0..60 {
+        let fade = libm::exp(-a * width);
+        let miss = a * height - slope * (1.0 - fade);
+        let next = a - miss / (height - slope * width * fade);
+        if next.is_nan() || next <= 0.0 || next >= a {
+            break;
+        }
+        a = next;
+    }
+    a
+}
+
+/// The paper's law: two exponentials that meet at the setpoint with one slope,
+/// eqs. (20) to (22).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PiecewiseExponential {
+    held: Held,
+    slope_per_m: f64,
+    left_per_m: f64,
+    right_per_m: f64,
+    left_scale: f64,
+    right_scale: f64,
+}
+
+impl PiecewiseExponential {
+    /// Solves the gains for a slope at the setpoint S \[1/m\], which must be
+    /// above [`Setpoint::least_slope`].
+    pub fn new(screw: &Screw, setpoint: Setpoint, slope_per_m: f64) -> Result<Self, ScrewError> {
+        let held = setpoint.check(screw)?;
+        let least_per_m = held.least_slope();
+        if !(slope_per_m > least_per_m && slope_per_m.is_finite()) {
+            return Err(ScrewError::Slope { slope_per_m, least_per_m });
+        }
+        let rise = held.most - held.hold;
+        let beyond = held.length_m - held.plug_m;
+        let left_per_m = gain(slope_per_m, rise, held.plug_m);
+        let right_per_m = gain(slope_per_m, held.hold, beyond);
+        Ok(Self {
+            held,
+            slope_per_m,
+            left_per_m,
+            right_per_m,
+            left_scale: rise / (1.0 - libm::exp(-left_per_m * held.plug_m)),
+            right_scale: held.hold / (1.0 - libm::exp(-right_per_m * beyond)),
+        })
+    }
+
+    /// Gains to the left and to the right of the setpoint, `a_l` and `a_r`
+    /// \[1/m\].
+    pub fn gains_per_m(&self) -> (f64, f64) {
+        (self.left_per_m, self.right_per_m)
+    }
+
+    /// Slope at the setpoint S \[1/m\].
+    pub fn slope_per_m(&self) -> f64 {
+        self.slope_per_m
+    }
+
+    fn fill(&self, plug_m: f64) -> f64 {
+        let off = plug_m - self.held.plug_m;
+        if off <= 0.0 {
+            self.held.hold + self.left_scale * (1.0 - libm::exp(self.left_per_m * off))
+        } else {
+            self.held.hold - self.right_scale * (1.0 - libm::exp(-self.right_per_m * off))
+        }
+    }
+}
+
+/// As much as can be fed until shortly before the setpoint, then straight
+/// through the share that holds it. It brings the plug there as soon as the
+/// limit allows; how steep it may be is a matter of how well the model is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Saturated {
+    held: Held,
+    slope_per_m: f64,
+}
+
+impl Saturated {
+    /// A law with a slope at the setpoint \[1/m\].
+    pub fn new(screw: &Screw, setpoint: Setpoint, slope_per_m: f64) -> Result<Self, ScrewError> {
+        let held = setpoint.check(screw)?;
+        positive("slope_per_m", slope_per_m)?;
+        Ok(Self { held, slope_per_m })
+    }
+}
+
+/// A law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum FillLaw {
+    /// The paper's.
+    Exponential(PiecewiseExponential),
+    /// The straight one between limits.
+    Saturated(Saturated),
+}
+
+impl FillLaw {
+    /// Share of full to feed at a length of the plug \[m\], from 0 to the
+    /// largest that can be fed. A length outside the screw counts as its nearer
+    /// end.
+    pub fn fill(&self, plug_m: f64) -> f64 {
+        let held = self.held();
+        let plug_m = plug_m.clamp(0.0, held.length_m);
+        let fill = match self {
+            Self::Exponential(law) => law.fill(plug_m),
+            Self::Saturated(law) => held.hold - law.slope_per_m * (plug_m - held.plug_m),
+        };
+        fill.clamp(0.0, held.most)
+    }
+
+    /// Share that holds the setpoint.
+    pub fn hold(&self) -> f64 {
+        self.held().hold
+    }
+
+    fn held(&self) -> &Held {
+        match self {
+            Self::Exponential(law) => &law.held,
+            Self::Saturated(law) => &law.held,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::extruder::screw::{Pulsation, ScrewDesign};
+    use proptest::prelude::*;
+
+    const SETPOINT: Setpoint = Setpoint { plug: Mm::constant(160.0), most: 0.9 };
+
+    fn screw() -> Screw {
+        ScrewDesign::DIAGNE_2015.screw(Pulsation::default()).unwrap()
+    }
+
+    #[test]
+    fn the_paper_s_gains_solve_their_equations() {
+        let screw = screw();
+        let least = SETPOINT.least_slope(&screw).unwrap();
+        assert!((least - 6.319_40).abs() < 1e-5, "{least}");
+        let law = PiecewiseExponential::new(&screw, SETPOINT, least + 30.0).unwrap();
+        let (left, right) = law.gains_per_m();
+        assert!((right - 143.214_9).abs() < 1e-4, "{right}");
+        assert!((left - 56.108_6).abs() < 1e-4, "{left}");
+        let (slope, hold) = (law.slope_per_m(), screw.holding(0.16));
+        assert!((left * (0.9 - hold) - slope * (1.0 - (-left * 0.16).exp())).abs() < 1e-12);
+        assert!((right * hold - slope * (1.0 - (-right * 0.04).exp())).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_law_feeds_all_when_empty_nothing_when_full_and_has_one_slope_between() {
+        let screw = screw();
+        let law = PiecewiseExponential::new(&screw, SETPOINT, 36.3194).unwrap();
+        let law = FillLaw::Exponential(law);
+        assert!((law.fill(0.0) - 0.9).abs() < 1e-15);
+        assert!(law.fill(0.2).abs() < 1e-15);
+        assert!((law.fill(0.16) - law.hold()).abs() < 1e-15);
+        let h = 1e-7;
+        for side in [-h, h] {
+            let slope = (law.fill(0.16) - law.fill(0.16 + side)) / side;
+            assert!((slope - 36.3194).abs() < 1e-3, "{slope}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_solved_is_said_with_what_is_needed() {
+        let screw = screw();
+        let flat = PiecewiseExponential::new(&screw, SETPOINT, 6.3).unwrap_err();
+        let said = flat.to_string();
+        assert_eq!(said, "a slope of 6.3/m at the setpoint is too flat: it must be above 6.3194/m");
+        assert!(PiecewiseExponential::new(&screw, SETPOINT, f64::NAN).is_err());
+        let weak = Setpoint { most: 0.2, ..SETPOINT };
+        assert!(matches!(weak.least_slope(&screw), Err(ScrewError::Most { .. })));
+        let full = Setpoint { most: 1.0, ..SETPOINT };
+        assert!(matches!(full.least_slope(&screw), Err(ScrewError::Most { .. })));
+        for plug in [0.0, 200.0, -3.0] {
+            let outside = Setpoint { plug: Mm::constant(plug), ..SETPOINT };
+            let found = Saturated::new(&screw, outside, 100.0);
+            assert!(matches!(found, Err(ScrewError::Setpoint { .. })), "{plug}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn both_laws_fall_and_keep_their_limits(
+            setpoint in 1.0..199.0_f64,
+            spare in 0.01..0.99_f64,
+            steeper in 1.001..200.0_f64,
+            one in -0.05..0.25_f64,
+            more in 0.0..0.2_f64,
+        ) {
+            let screw = screw();
+            let hold = screw.holding(setpoint / 1000.0);
+            let setpoint = Setpoint { plug: Mm::constant(setpoint), most: hold + spare * (0.999 - hold) };
+            let slope = steeper * setpoint.least_slope(&screw).unwrap();
+            let exponential = PiecewiseExponential::new(&screw, setpoint, slope).unwrap();
+            let (left, right) = exponential.gains_per_m();
+            prop_assert!(left > 0.0 && right > 0.0);
+            let saturated = Saturated::new(&screw, setpoint, slope).unwrap();
+            for law in [FillLaw::Exponential(exponential), FillLaw::Saturated(saturated)] {
+                let (before, after) = (law.fill(one), law.fill(one + more));
+                prop_assert!((0.0..=setpoint.most).contains(&before));
+                prop_assert!(after <= before);
+            }
+        }
+    }
+}

@@ -1,0 +1,243 @@
+//! The adaptive law of the nozzle behind the face of a strategy: the wanted
+//! flow becomes a speed in the nozzle, the mass flow that is fed is commanded.
+//! Mohammadi Looey et al. 2026, eq. (8); the strand's sub-system commands the
+//! plate, which is the robot's side.
+
+use super::interface::{Need, Strategy, Unusable, Wish};
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm2, Mm3PerS};
+use crate::extruder::adaptive::{AdaptiveLaw, ScalarPlant};
+use crate::extruder::report::ExtruderReport;
+
+/// Metres in a millimetre.
+const M_PER_MM: f64 = 1e-3;
+
+/// What the law has to know beside its gains.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NozzleModel {
+    /// Section of the nozzle, by which a flow is a speed.
+    pub section: Mm2,
+    /// (β1/β3)·p of a constant pressure gradient, as a part of the feed
+    /// \[kg/s\].
+    pub pressure_kg_per_s: f64,
+}
+
+/// The law with its nozzle. The flow at the nozzle must be reported.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AdaptiveNozzle {
+    law: AdaptiveLaw,
+    nozzle: NozzleModel,
+    reference: f64,
+    wish: Wish,
+    begun: bool,
+    /// What was applied since the last answer.
+    applied: Applied,
+}
+
+/// The mean of what was applied, which is all that the law's model of a held
+/// command can be told of.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Applied {
+    last: Option<(Stamp, f64)>,
+    secs: f64,
+    sum: f64,
+}
+
+impl Applied {
+    /// The last one held until now.
+    fn hold(&mut self, now: Stamp) {
+        if let Some((since, value)) = &mut self.last {
+            let secs = (now - *since).secs().max(0.0);
+            *since = now;
+            self.secs += secs;
+            self.sum += secs * *value;
+        }
+    }
+
+    /// Another one from now on.
+    fn set(&mut self, now: Stamp, value: f64) {
+        self.hold(now);
+        self.last = Some((now, value));
+    }
+
+    /// The mean until now; a new one begins. None where no time has passed.
+    fn take(&mut self, now: Stamp) -> Option<f64> {
+        self.hold(now);
+        let mean = (self.secs > 0.0).then_some(self.sum / self.secs);
+        (self.secs, self.sum) = (0.0, 0.0);
+        mean
+    }
+}
+
+impl AdaptiveNozzle {
+    /// Before its first bead.
+    pub fn new(law: AdaptiveLaw, nozzle: NozzleModel) -> Self {
+        Self {
+            law,
+            nozzle,
+            reference: 0.0,
+            wish: Wish::default(),
+            begun: false,
+            applied: Applied::default(),
+        }
+    }
+
+    /// Speed in the nozzle \[m/s\].
+    fn speed(&self, flow: Mm3PerS) -> f64 {
+        flow.get() / self.nozzle.section.get() * M_PER_MM
+    }
+
+    /// The feed that holds a speed in the nozzle if nothing is unknown
+    /// \[kg/s\].
+    fn holding(&self, speed: f64) -> f64 {
+        let ScalarPlant { state_gain_per_s, input_gain } = self.law.plant();
+        -state_gain_per_s / input_gain * speed - self.nozzle.pressure_kg_per_s
+    }
+}
+
+impl Strategy for AdaptiveNozzle {
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Flow]
+    }
+
+    fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> Wish {
+        let speed = self.speed(flow);
+        self.reference = self.law.reference_for(speed);
+        // What was learnt on the last bead still holds.
+        self.wish = Wish::known(self.holding(speed) - self.law.estimate());
+        self.begun = false;
+        self.applied = Applied::default();
+        self.wish
+    }
+
+    fn foresee(&mut self, _dt: Span, flow: Mm3PerS) {
+        self.reference = self.law.reference_for(self.speed(flow));
+    }
+
+    fn answer(&mut self, now: Stamp, dt: Span, report: &ExtruderReport) -> Result<(), Unusable> {
+        let flow = report.flow_mm3_per_s.ok_or(Unusable)?;
+        let (measured, known) = (self.speed(flow), self.nozzle.pressure_kg_per_s);
+        if let Some(mean) = self.applied.take(now) {
+            self.law.settle(mean);
+        }
+        if !self.begun {
+            self.begun = true;
+            // The flow is no steady one yet; what was learnt before still holds.
+            let learnt = self.law.estimate();
+            self.law.start(measured, self.wish.value, known);
+            self.law.know(learnt);
+        }
+        let action = self.law.step(measured, self.reference, known, dt);
+        let feedforward = self.holding(action.model);
+        self.wish =
+            Wish { value: action.command, feedforward, feedback: action.command - feedforward };
+        Ok(())
+    }
+
+    fn wish(&self) -> Wish {
+        self.wish
+    }
+
+    fn resume(&mut self, now: Stamp, applied: f64) {
+        self.begun = false;
+        self.applied = Applied::default();
+        self.settle(now, applied);
+    }
+
+    fn settle(&mut self, now: Stamp, applied: f64) {
+        self.applied.set(now, applied);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::core::units::Mm2;
+    use crate::extruder::adaptive::{Adaptation, Gains, Safety};
+
+    fn law() -> AdaptiveNozzle {
+        let plant = ScalarPlant { state_gain_per_s: -1.0, input_gain: 1.0 };
+        let adaptation = Adaptation::Constant { learning_rate: 4.0, weight: 1.0 };
+        let gains =
+            Gains { feedback: 1.604, error_feedback: 0.0, adaptation, safety: Safety::default() };
+        let law = AdaptiveLaw::new(plant, gains, Span::from_millis(50)).unwrap();
+        let nozzle = NozzleModel { section: Mm2::constant(100.0), pressure_kg_per_s: 0.0 };
+        AdaptiveNozzle::new(law, nozzle)
+    }
+
+    fn report(flow: f64) -> ExtruderReport {
+        ExtruderReport {
+            pump: crate::extruder::PumpMode::On,
+            valve_open: true,
+            screw_rpm: None,
+            pressure_mpa: None,
+            flow_mm3_per_s: Some(Mm3PerS::constant(flow)),
+            filled_mm: None,
+        }
+    }
+
+    /// Runs the law against its plant with a part that it does not know; gives
+    /// the law and the flow at the end.
+    fn run(secs: f64, unknown: f64) -> (AdaptiveNozzle, f64) {
+        let (mut law, wanted) = (law(), Mm3PerS::constant(1000.0));
+        let (mut speed, mut now) = (0.01, Stamp::START);
+        let mut command = law.begin(now, wanted).value;
+        let mut dt = Span::ZERO;
+        while now.secs() < secs {
+            law.foresee(dt, wanted);
+            law.answer(now, dt, &report(speed * 100.0 / M_PER_MM)).unwrap();
+            command = law.wish().value;
+            law.settle(now, command);
+            dt = Span::from_millis(50);
+            let kept = (-dt.secs()).exp();
+            speed = kept * speed + (1.0 - kept) * (command + unknown);
+            now = now + dt;
+        }
+        assert!(command.is_finite());
+        (law, speed * 100.0 / M_PER_MM)
+    }
+
+    fn after(secs: f64, unknown: f64) -> f64 {
+        run(secs, unknown).1
+    }
+
+    #[test]
+    fn what_was_learnt_on_one_bead_holds_at_the_beginning_of_the_next() {
+        let wanted = Mm3PerS::constant(1000.0);
+        let first = law().begin(Stamp::START, wanted).value;
+        assert!((first - 0.010).abs() < 1e-9, "{first}");
+        let (mut law, _) = run(40.0, -0.004);
+        let next = law.begin(Stamp::from_secs(60.0), wanted).value;
+        assert!((next - 0.014).abs() < 2e-5, "{next}");
+    }
+
+    #[test]
+    fn a_command_that_climbs_within_a_hold_counts_by_its_mean() {
+        let (mut stepwise, mut at_once) = (law(), law());
+        let wanted = Mm3PerS::constant(1000.0);
+        let ms = Span::from_millis;
+        for law in [&mut stepwise, &mut at_once] {
+            let _ = law.begin(Stamp::START, wanted);
+            law.settle(Stamp::START, 0.004);
+            law.answer(Stamp::START, Span::ZERO, &report(500.0)).unwrap();
+        }
+        for i in 0_u32..10 {
+            let now = Stamp::START + ms(5 * i64::from(i));
+            stepwise.settle(now, 0.004 + 0.0004 * f64::from(i));
+            at_once.settle(now, 0.0058);
+        }
+        for law in [&mut stepwise, &mut at_once] {
+            law.answer(Stamp::START + ms(50), ms(50), &report(500.0)).unwrap();
+        }
+        let [a, b] = [stepwise, at_once].map(|law| law.wish().value);
+        assert!((a - b).abs() < 1e-12 && a.is_finite(), "{a} {b}");
+    }
+
+    #[test]
+    fn a_feed_that_slips_is_learnt_until_the_flow_is_the_wanted_one() {
+        assert!((after(20.0, 0.0) - 1000.0).abs() < 0.1);
+        assert!((after(40.0, -0.004) - 1000.0).abs() < 1.0);
+        // ë + a·ė + 4e = 0 leaves 94.6 mm³/s less at half a second.
+        assert!((after(0.5, -0.004) - 905.4).abs() < 8.0);
+    }
+}

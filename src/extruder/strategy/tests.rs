@@ -1,0 +1,321 @@
+//! Laws under the supervisor, against plants.
+
+use super::*;
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{MPa, Mm, Mm2, Mm3PerS, Rpm};
+use crate::extruder::adaptive::{Adaptation, AdaptiveLaw, Gains, Safety, ScalarPlant};
+use crate::extruder::feedforward::{InverseSettings, RightZeros, Tracker};
+use crate::extruder::limits::CommandLimits;
+use crate::extruder::pressure::kalman::Noise;
+use crate::extruder::pressure::pi::PiGains;
+use crate::extruder::pressure::tuning::Tuning;
+use crate::extruder::pressure::vsfc::VsfcGains;
+use crate::extruder::pressure::{Fopdt, Running};
+use crate::extruder::report::ExtruderReport;
+use crate::extruder::rheology::PowerLaw;
+use crate::extruder::screw::control::{Scheme, ScrewSettings};
+use crate::extruder::screw::feedback::Setpoint;
+use crate::extruder::screw::{FillLaw, PiecewiseExponential, Pulsation, ScrewDesign};
+use crate::extruder::{
+    Drive, ExtruderHold, ExtruderSetup, ExtruderState, Laying, PumpMode, Supervisor,
+};
+use crate::numeric::lti::{Between, Simulator, TransferFunction};
+use crate::sim::pressure::{Disturbed, SimPressure};
+use crate::sim::screw::{Integrator, SimScrew};
+
+const TICK: Span = Span::from_millis(5);
+
+pub(super) fn report() -> ExtruderReport {
+    ExtruderReport {
+        pump: PumpMode::On,
+        valve_open: true,
+        screw_rpm: None,
+        pressure_mpa: None,
+        flow_mm3_per_s: None,
+        filled_mm: None,
+    }
+}
+
+fn supervisor(drive: Drive, law: Law, limits: CommandLimits) -> Supervisor {
+    Supervisor::new(ExtruderSetup {
+        drive,
+        law,
+        limits,
+        feedforward_period: TICK,
+        control_period: Span::from_millis(50),
+        io_period: Span::from_millis(20),
+        max_gap: Span::from_millis(200),
+        max_hold: Span::from_secs(2.0),
+        max_pressure: None,
+        filters: crate::extruder::ReadingFilters::default(),
+        robot_follows: crate::extruder::RobotFollows::Nothing,
+        timing: None,
+        plan: None,
+    })
+}
+
+/// Something that is told a command every 5 ms, none while the pump stands,
+/// and reports every 20 ms.
+trait Machine {
+    fn advance(&mut self, command: Option<f64>);
+    fn report(&self) -> ExtruderReport;
+}
+
+/// A plant that answers at once or with a lag, and reports its flow.
+struct Lagging {
+    simulator: Simulator,
+    flow: f64,
+}
+
+impl Lagging {
+    fn new(gain: f64, lag_s: f64) -> Self {
+        let plant = TransferFunction::new(&[gain], &[lag_s, 1.0], 0.0).unwrap();
+        let simulator = Simulator::new(&plant, TICK.secs(), Between::Held).unwrap();
+        Self { simulator, flow: 0.0 }
+    }
+}
+
+impl Machine for Lagging {
+    fn advance(&mut self, command: Option<f64>) {
+        self.flow = self.simulator.step(command.unwrap_or(0.0));
+    }
+
+    fn report(&self) -> ExtruderReport {
+        ExtruderReport { flow_mm3_per_s: Mm3PerS::new(self.flow).ok(), ..report() }
+    }
+}
+
+/// Runs for a time from a moment on.
+fn run(side: &mut Supervisor, machine: &mut impl Machine, ticks: (u32, u32), laying: Laying) {
+    let _ = commanded(side, machine, ticks, laying, true);
+}
+
+/// The same, with reports or without; gives the commands of a pump that runs.
+fn commanded(
+    side: &mut Supervisor,
+    machine: &mut impl Machine,
+    (from, to): (u32, u32),
+    laying: Laying,
+    reports: bool,
+) -> Vec<f64> {
+    let mut all = Vec::new();
+    let mut told = None;
+    for tick in from..to {
+        let now = Stamp::from_secs(f64::from(tick) * TICK.secs());
+        if reports && tick.is_multiple_of(4) {
+            let runs = matches!(laying, Laying::Bead(_));
+            let pump = if runs { PumpMode::On } else { PumpMode::Off };
+            side.reported(now, &ExtruderReport { pump, ..machine.report() });
+        }
+        if let Some(command) = side.tick(now, laying) {
+            told = command.pump_on.then_some(command.value);
+            all.extend(told);
+        }
+        machine.advance(told);
+    }
+    all
+}
+
+struct Pressed(SimPressure);
+
+impl Machine for Pressed {
+    fn advance(&mut self, command: Option<f64>) {
+        self.0.command(Rpm::new(command.unwrap_or(0.0)).unwrap());
+        self.0.advance();
+    }
+
+    fn report(&self) -> ExtruderReport {
+        ExtruderReport { pressure_mpa: Some(self.0.read()), ..report() }
+    }
+}
+
+fn pressed(choice: fn(&Fopdt, Noise) -> PressureChoice) -> (Supervisor, Pressed) {
+    let process = Fopdt::new(0.02, 0.84, 0.41).unwrap();
+    let noise = Noise::new(2e-5, 4.98e-5).unwrap();
+    let limits = CommandLimits::new(0.0, 90.0, 1e4).unwrap();
+    let settings = PressureSettings {
+        choice: choice(&process, noise),
+        model: process,
+        noise,
+        nozzle: PowerLaw::PP_GF28,
+        limits,
+    };
+    let side = supervisor(Drive::Rpm, Law::Pressure(Box::new(PressureLoop::new(settings))), limits);
+    let rest = Running { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO };
+    let disturbed = Disturbed { noise_mpa2: 1e-6, seed: 7, ..Disturbed::default() };
+    (side, Pressed(SimPressure::new(process, disturbed, Rpm::constant(90.0), rest)))
+}
+
+fn predictive(process: &Fopdt, noise: Noise) -> PressureChoice {
+    PressureChoice::Predictive(Tuning::of(process, &noise, 0.1).unwrap())
+}
+
+#[test]
+fn the_pressure_of_a_flow_is_reached_on_every_bead_from_a_standing_screw() {
+    let flow = PowerLaw::PP_GF28.flow(MPa::constant(0.6)).unwrap();
+    // The second bead begins while the first one's pressure has not gone yet.
+    for pause in [200, 3000] {
+        let (mut side, mut machine) = pressed(predictive);
+        for bead in 0..2 {
+            let start = bead * (1000 + pause);
+            run(&mut side, &mut machine, (start, start + 1000), Laying::Bead(flow));
+            let pressure = machine.0.pressure();
+            assert!((pressure - 0.6).abs() < 0.03, "pause {pause}, bead {bead}: {pressure}");
+            assert_eq!(side.state(), ExtruderState::Running);
+            run(&mut side, &mut machine, (start + 1000, start + 1000 + pause), Laying::Idle);
+        }
+    }
+}
+
+/// Reports stay out for half a second from several moments on, then come
+/// again: the command must go on from where it was, and another bead must come
+/// to the same command.
+fn goes_on(name: &str, make: &dyn Fn() -> (Supervisor, Box<dyn Machine>), flow: f64) {
+    let bead = Laying::Bead(Mm3PerS::constant(flow));
+    for phase in 0..11 {
+        let (mut side, mut machine) = make();
+        let mut machine = Boxed(machine.as_mut());
+        let start = 2000 + phase;
+        let before = commanded(&mut side, &mut machine, (0, start), bead, true);
+        let steady = *before.last().unwrap();
+        let held = commanded(&mut side, &mut machine, (start, start + 100), bead, false);
+        assert_eq!(held.last(), held.get(held.len() - 5), "{name} {phase}");
+        assert!(matches!(side.state(), ExtruderState::Holding(ExtruderHold::NoReading)), "{name}");
+        let after = commanded(&mut side, &mut machine, (start + 100, start + 500), bead, true);
+        assert_eq!(side.state(), ExtruderState::Running, "{name} {phase}");
+        let jump = after.iter().map(|value| (value - steady).abs()).fold(0.0, f64::max);
+        assert!(jump < 0.12 * steady, "{name} {phase}: {jump} of {steady}");
+        run(&mut side, &mut machine, (start + 500, start + 603), Laying::Idle);
+        let next = commanded(&mut side, &mut machine, (start + 603, start + 2600), bead, true);
+        let reached = *next.last().unwrap();
+        assert!((reached - steady).abs() < 0.05 * steady, "{name} {phase}: {reached} {steady}");
+    }
+}
+
+struct Boxed<'a>(&'a mut dyn Machine);
+
+impl Machine for Boxed<'_> {
+    fn advance(&mut self, command: Option<f64>) {
+        self.0.advance(command);
+    }
+
+    fn report(&self) -> ExtruderReport {
+        self.0.report()
+    }
+}
+
+#[test]
+fn no_law_jumps_after_a_hold_and_every_law_finds_its_command_on_the_next_bead() {
+    let flow = PowerLaw::PP_GF28.flow(MPa::constant(0.6)).unwrap().get();
+    let of = |choice: fn(&Fopdt, Noise) -> PressureChoice| {
+        move || {
+            let (side, machine) = pressed(choice);
+            (side, Box::new(machine) as Box<dyn Machine>)
+        }
+    };
+    goes_on("predictive", &of(predictive), flow);
+    let vsfc = |_: &Fopdt, noise: Noise| {
+        PressureChoice::Vsfc(VsfcGains::new(40.0, 60.0, 0.3, noise.sigma()).unwrap())
+    };
+    goes_on("vsfc", &of(vsfc), flow);
+    let pi = |_: &Fopdt, _| PressureChoice::Pi(PiGains::new(50.0, 1.0, 1.0).unwrap());
+    goes_on("pi", &of(pi), flow);
+    let filled = || {
+        let (side, machine) = screw();
+        (side, Box::new(machine) as Box<dyn Machine>)
+    };
+    goes_on("screw", &filled, 1.0);
+    goes_on("feedforward", &foreseen, 460.0);
+    goes_on("adaptive", &adaptive, 460.0);
+}
+
+fn foreseen() -> (Supervisor, Box<dyn Machine>) {
+    let model = TransferFunction::new(&[12.0], &[0.84, 1.0], 0.0).unwrap();
+    let limits = CommandLimits::new(0.0, 90.0, 200.0).unwrap();
+    let settings = InverseSettings {
+        time_constant_s: 0.1,
+        right_zeros: RightZeros::Refuse,
+        known_ahead: Span::ZERO,
+        late: Span::ZERO,
+        limits,
+        period: TICK,
+    };
+    let law = Foreseen::new(Tracker::new(&model, &settings).unwrap(), OperatingPoint::default());
+    let side = supervisor(Drive::Rpm, Law::Feedforward(Box::new(law)), limits);
+    (side, Box::new(Lagging::new(12.0, 0.84)))
+}
+
+fn adaptive() -> (Supervisor, Box<dyn Machine>) {
+    let plant = ScalarPlant { state_gain_per_s: -2.0, input_gain: 4.0 };
+    let adaptation = Adaptation::Ramp { learning_rate: 0.5, weight: 1.0, slope_rate_per_s: 0.3 };
+    let safety = Safety { bound: Some(0.001), leakage_per_s: 0.0 };
+    let gains = Gains { feedback: 0.2, error_feedback: 0.0, adaptation, safety };
+    let law = AdaptiveLaw::new(plant, gains, Span::from_millis(50)).unwrap();
+    // 100 mm²: 2 kg/s for each m/s, 1e5 mm³/s for each m/s; less 10 %.
+    let nozzle = NozzleModel { section: Mm2::constant(100.0), pressure_kg_per_s: 0.0 };
+    let limits = CommandLimits::new(0.0, 0.1, 1.0).unwrap();
+    let law = Law::Adaptive(AdaptiveNozzle::new(law, nozzle));
+    let side = supervisor(Drive::MassFlow, law, limits);
+    (side, Box::new(Lagging::new(0.9 * 2e5, 0.5)))
+}
+
+struct Filled(SimScrew);
+
+impl Machine for Filled {
+    fn advance(&mut self, command: Option<f64>) {
+        if let Some(fill) = command {
+            self.0.advance(fill);
+        }
+    }
+
+    fn report(&self) -> ExtruderReport {
+        ExtruderReport { filled_mm: Mm::new(self.0.plug_m() * 1000.0).ok(), ..report() }
+    }
+}
+
+fn screw() -> (Supervisor, Filled) {
+    let pulsation = Pulsation { share: 0.1, rad_per_s: 3.5, phase_rad: 0.0 };
+    let screw = ScrewDesign::DIAGNE_2015.screw(pulsation).unwrap();
+    let setpoint = Setpoint { plug: Mm::constant(160.0), most: 0.9 };
+    let law = PiecewiseExponential::new(&screw, setpoint, 36.3194).unwrap();
+    let law = FillLaw::Exponential(law);
+    let settings = ScrewSettings {
+        screw,
+        law,
+        scheme: Scheme::Exact,
+        period: Span::from_millis(50),
+        before: screw.holding(0.1),
+    };
+    let law = Law::Screw(ScrewFill::new(&settings).unwrap());
+    let side = supervisor(Drive::Filling, law, CommandLimits::new(0.0, 0.9, 1e3).unwrap());
+    let scheme = Integrator::RungeKutta(TICK.secs());
+    (side, Filled(SimScrew::new(screw, scheme, TICK.secs(), 0.1, screw.holding(0.1))))
+}
+
+#[test]
+fn what_was_on_its_way_when_the_screw_stood_still_is_known_on_the_next_bead() {
+    let (mut side, mut machine) = screw();
+    let bead = Laying::Bead(Mm3PerS::constant(1.0));
+    // The first bead ends while the feed is on its way to the plug.
+    run(&mut side, &mut machine, (0, 200), bead);
+    run(&mut side, &mut machine, (200, 5000), Laying::Idle);
+    run(&mut side, &mut machine, (5000, 5800), bead);
+    let plug = machine.0.plug_m();
+    assert!((plug - 0.16).abs() < 0.001, "{plug}");
+}
+
+#[test]
+fn a_screw_filled_beyond_its_length_is_a_hold_until_it_reads_right() {
+    let (mut side, mut machine) = screw();
+    let bead = Laying::Bead(Mm3PerS::constant(1.0));
+    run(&mut side, &mut machine, (0, 400), bead);
+    let bad = ExtruderReport { filled_mm: Some(Mm::constant(250.0)), ..report() };
+    let at = |tick: u32| Stamp::from_secs(f64::from(tick) * TICK.secs());
+    for tick in 400..500 {
+        side.reported(at(tick), &bad);
+        let _ = side.tick(at(tick), bead);
+    }
+    assert_eq!(side.state(), ExtruderState::Holding(ExtruderHold::BadReading));
+    run(&mut side, &mut machine, (500, 520), bead);
+    assert_eq!(side.state(), ExtruderState::Running);
+}
