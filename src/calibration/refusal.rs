@@ -3,8 +3,13 @@
 use super::board::NotABoard;
 use super::charuco::NoMarkers;
 use super::outline::Side;
-use super::sighting::{LEAST_CORNERS, LEAST_LINES};
 use crate::bridge::BridgeError;
+
+/// Corners of a board with markers that must show, in [`LEAST_LINES`] of its rows and as
+/// many columns.
+pub const LEAST_CORNERS: usize = 8;
+/// The rows and the columns.
+pub const LEAST_LINES: usize = 3;
 
 /// Why a picture is not used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -8,7 +8,7 @@ use super::focus::{Focus, Unsharp};
 use super::grey::Grey;
 use super::outline;
 use super::outline::Outline;
-use super::refusal::Refusal;
+use super::refusal::{LEAST_CORNERS, LEAST_LINES, Refusal};
 use crate::bridge;
 use crate::core::frame::Frame;
 use crate::core::geometry::ImagePoint;
@@ -16,12 +16,6 @@ use crate::core::geometry::ImagePoint;
 /// Mean shift of the corners below which two pictures show the board in one place
 /// \[px\]: they say the same twice, and count as one.
 const SAME_PLACE_PX: f64 = 1.0;
-/// Corners of a board with markers that must show, in [`LEAST_LINES`] of its rows and as
-/// many columns.
-pub const LEAST_CORNERS: usize = 8;
-/// The rows and the columns.
-pub const LEAST_LINES: usize = 3;
-
 /// The board as one picture shows it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sighting {

@@ -1,8 +1,8 @@
 //! OpenCV's `FileStorage` as YAML, with the keys of its calibration sample, or
 //! those that people give to the same matrices.
 
-use super::Intrinsics;
 use super::fields::{Fields, Names};
+use super::intrinsics::Intrinsics;
 use super::write::{number, row};
 use crate::calibration::camera::COEFFICIENTS;
 use crate::calibration::file::RMS_PX;

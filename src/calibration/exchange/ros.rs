@@ -2,8 +2,8 @@
 //! `camera_info_manager` reads, and `sensor_msgs/CameraInfo` as `ros2 topic echo`
 //! prints it.
 
-use super::Intrinsics;
 use super::fields::{Fields, Matrix, Names};
+use super::intrinsics::Intrinsics;
 use super::write::row;
 use crate::calibration::camera::COEFFICIENTS;
 
