@@ -21,9 +21,9 @@
 mod course;
 mod data;
 mod error;
+mod estimate;
 mod observation;
 mod profile;
-mod study;
 mod whiten;
 
 #[cfg(test)]
@@ -32,9 +32,9 @@ mod tests;
 use course::Course;
 use data::Data;
 pub use error::{FEWEST, FEWEST_PIECES, OffsetError};
+pub use estimate::{EXPONENTS, Found, Seen, SpeedRange, Study};
 use observation::Look;
 use profile::{NearlyAsGood, Profile};
-pub use study::{EXPONENTS, Found, Seen, SpeedRange, Study};
 use whiten::Noise;
 
 use crate::core::robot::RobotState;

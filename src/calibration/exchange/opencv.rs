@@ -31,7 +31,7 @@ pub(super) fn read(fields: &Fields<'_>, notes: &mut Vec<String>) -> Option<Intri
                 .to_owned(),
         );
     }
-    let camera = fields.camera((matrix, distortion), &[4, 5, COEFFICIENTS, 12, 14], size);
+    let camera = fields.camera(matrix, distortion, &[4, 5, COEFFICIENTS, 12, 14], size);
     let rms_px = fields.optional_number(RMS, "avg_reprojection_error", RMS_PX);
     Some(Intrinsics { image_size_px: size?, camera: camera?, rms_px, camera_name: None })
 }

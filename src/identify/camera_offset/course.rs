@@ -1,7 +1,7 @@
 //! The speed at which bead was laid, along the path.
 
+use super::estimate::SpeedRange;
 use super::observation::Look;
-use super::study::SpeedRange;
 use crate::core::robot::RobotState;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};

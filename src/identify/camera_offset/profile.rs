@@ -3,8 +3,8 @@
 
 use super::course::Course;
 use super::data::{Data, median};
+use super::estimate::{EXPONENTS, Seen};
 use super::observation::Look;
-use super::study::{EXPONENTS, Seen};
 use super::whiten::{Noise, Whitener};
 use crate::core::units::Mm;
 use crate::numeric::number::float;
