@@ -2,7 +2,7 @@
 //! cross, between which the grey values are fitted by least squares. With pixels that
 //! are off by chance no method finds it better.
 
-mod model;
+mod shape;
 mod window;
 
 use nalgebra::Vector2;
@@ -11,7 +11,7 @@ use super::board::Board;
 use super::grey::Grey;
 use crate::core::geometry::{GridSize, ImagePoint, Size};
 use crate::numeric::blurred_step::StepTable;
-use model::{Corner, NUMBERS, Sample, Sums};
+use shape::{Corner, NUMBERS, Sample, Sums};
 use window::{Line, Marked, Window};
 
 const MOST_STEPS: usize = 25;

@@ -5,7 +5,7 @@
 
 mod fields;
 mod intrinsics;
-mod model;
+mod matrix;
 pub mod opencv;
 pub mod ros;
 mod write;

@@ -23,7 +23,7 @@ mod data;
 mod error;
 mod estimate;
 mod observation;
-mod profile;
+mod offset_profile;
 mod whiten;
 
 #[cfg(test)]
@@ -34,7 +34,7 @@ use data::Data;
 pub use error::{FEWEST, FEWEST_PIECES, OffsetError};
 pub use estimate::{EXPONENTS, Found, Seen, SpeedRange, Study};
 use observation::Look;
-use profile::{NearlyAsGood, Profile};
+use offset_profile::{NearlyAsGood, Profile};
 use whiten::Noise;
 
 use crate::core::robot::RobotState;
@@ -147,7 +147,7 @@ struct Settled {
     used: Vec<Look>,
     noise: Noise,
     profile: Profile,
-    best: profile::Fit,
+    best: offset_profile::Fit,
 }
 
 /// Finds them in turn, each with what is known of the others.
@@ -175,7 +175,7 @@ fn settle(
             return Err(OffsetError::NotFollowing { from, to, farthest: search.farthest });
         }
         let likeliest = profile.likeliest_noise(&best);
-        let next = profile::those_that_count(course, looks, search.gauge, &best, likeliest);
+        let next = offset_profile::those_that_count(course, looks, search.gauge, &best, likeliest);
         if next.len() < FEWEST {
             return Err(OffsetError::TooFew { found: next.len() });
         }

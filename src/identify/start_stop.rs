@@ -17,7 +17,7 @@ mod error;
 mod estimate;
 mod fall;
 pub mod file;
-mod least;
+mod least_squares;
 pub mod parameters;
 mod rise;
 mod void;

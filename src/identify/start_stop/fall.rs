@@ -4,7 +4,7 @@
 use super::episodes::Episode;
 use super::error::StartStopFitError;
 use super::estimate::SeenStop;
-use super::least::descend;
+use super::least_squares::descend;
 use super::parameters::StartStop;
 use crate::numeric::number::float;
 

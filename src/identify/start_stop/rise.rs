@@ -5,7 +5,7 @@ use super::episodes::Episode;
 use super::error::StartStopFitError;
 use super::estimate::SeenStart;
 use super::fall::Falling;
-use super::least::descend;
+use super::least_squares::descend;
 use super::parameters::StartStop;
 use crate::numeric::rank;
 

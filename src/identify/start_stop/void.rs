@@ -3,7 +3,7 @@
 
 use super::error::StartStopFitError;
 use super::estimate::SeenStart;
-use super::least::descend;
+use super::least_squares::descend;
 use crate::numeric::number::float;
 
 /// Parameters of the delay; see [`crate::extruder::start_stop::StartStop`].
