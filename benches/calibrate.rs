@@ -86,9 +86,8 @@ fn next_picture(bencher: Bencher<'_, '_>) {
     let (board, solution) = (board(), solution());
     let covariance = covariance(&solution);
     let heights = [Mm::ZERO, Mm::constant(20.0)];
-    bencher.bench_local(|| {
-        next_view::best(&board, &solution, black_box(&covariance), (80.0, &heights))
-    });
+    bencher
+        .bench_local(|| next_view::best(&board, &solution, black_box(&covariance), 80.0, &heights));
 }
 
 fn main() {

@@ -13,6 +13,7 @@ pub mod coverage;
 pub mod dictionary;
 pub mod equations;
 pub mod exchange;
+mod factor;
 pub mod file;
 pub mod focus;
 mod grey;

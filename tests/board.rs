@@ -46,7 +46,7 @@ fn save(frame: &Frame, path: &Path) {
 fn scene(folder: &Path, higher_mm: f64) -> (PathBuf, PathBuf) {
     let (calibration, picture) = (folder.join("calib.toml"), folder.join("board.png"));
     let bed = bed_from_board(&pose(0.0), Mm::ZERO);
-    let text = file::to_toml((&camera(), &bed), SIZE, Mm::ZERO, None, &[]);
+    let text = file::to_toml(&camera(), &bed, SIZE, Mm::ZERO, None, &[]);
     fs::write(&calibration, text).unwrap();
     let frame = BoardStudio::new(&camera(), SIZE)
         .take(&board(), &pose(higher_mm), Exposure::SHARP, 5)

@@ -52,7 +52,7 @@ fn calibration(path: &Path) {
         uncertainty: None,
     };
     let bed = Pose::new(Vector3::new(3.0, 0.1, -0.2), Vector3::new(1.5, -2.25, 400.125));
-    let text = file::to_toml((&camera(), &bed), SIZE, Mm::ZERO, Some(quality), &[]);
+    let text = file::to_toml(&camera(), &bed, SIZE, Mm::ZERO, Some(quality), &[]);
     fs::write(path, text).unwrap();
 }
 

@@ -86,7 +86,7 @@ fn camera() -> Camera {
 /// place 4,-1 is 80 mm ahead of it.
 fn scene(folder: &Path) -> (PathBuf, PathBuf) {
     let (cell, picture) = (folder.join("cell.toml"), folder.join("board.png"));
-    let text = file::to_toml((&camera(), &bed()), SIZE, Mm::ZERO, None, &[]);
+    let text = file::to_toml(&camera(), &bed(), SIZE, Mm::ZERO, None, &[]);
     fs::write(folder.join("calib.toml"), text).unwrap();
     let text = "[calibration]\nfile = \"calib.toml\"\nsurface_height_mm = 10.0\n\
                 [gauge]\nroi_px = [220, 140, 200, 200]\nbead_axis = \"vertical\"\n\

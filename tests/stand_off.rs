@@ -82,7 +82,7 @@ fn film(folder: &Path) {
 /// Frames of a bead on a surface, as the true camera sees them; their true widths \[mm\].
 fn beads(folder: &Path, height_mm: f64) -> (PathBuf, Vec<f64>) {
     let bed = bed_from_board(&poses().0, Mm::ZERO);
-    let truth = file::to_toml((&camera(), &bed), SIZE, Mm::ZERO, None, &[]);
+    let truth = file::to_toml(&camera(), &bed, SIZE, Mm::ZERO, None, &[]);
     fs::write(folder.join("truth.toml"), truth).unwrap();
     let scenario = folder.join("scenario.toml");
     fs::write(

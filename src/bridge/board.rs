@@ -10,18 +10,15 @@ use opencv::core::{Mat, MatTraitConst, Point2f, Size, Vector};
 
 use super::{BridgeError, during, grey8_mat, prepare};
 use crate::core::frame::Frame;
-use crate::core::geometry::ImagePoint;
+use crate::core::geometry::{GridSize, ImagePoint};
 
-/// Finds the inner corners of a checkerboard, `columns` by `rows` of them, row
-/// by row \[px\]. `None` where the whole board is not in the picture.
+/// Finds the inner corners of a checkerboard, so many of them, row by row \[px\]. `None` where the whole board is not in the picture.
 ///
 /// Quads in an adaptive threshold first; where these are not found, the slower
 /// search for saddle points (Duda and Frese 2018), which sees through blur and
 /// uneven light. [`crate::calib::corner`] finds where exactly they are.
-pub fn find_board(
-    frame: &Frame,
-    (columns, rows): (usize, usize),
-) -> Result<Option<Vec<ImagePoint>>, BridgeError> {
+pub fn find_board(frame: &Frame, inner: GridSize) -> Result<Option<Vec<ImagePoint>>, BridgeError> {
+    let GridSize { columns, rows } = inner;
     prepare();
     let (Ok(width), Ok(height)) = (i32::try_from(columns), i32::try_from(rows)) else {
         return Ok(None);
@@ -48,7 +45,7 @@ fn search(image: &Mat, pattern: Size, corners: &mut Vector<Point2f>) -> opencv::
 
 /// How many inner corners the largest board in a picture has, columns and rows.
 /// `None` where there is none of at least 3 by 3.
-pub fn find_any_board(frame: &Frame) -> Result<Option<(usize, usize)>, BridgeError> {
+pub fn find_any_board(frame: &Frame) -> Result<Option<GridSize>, BridgeError> {
     prepare();
     let image = grey8_mat(frame)?;
     let (mut corners, mut meta) = (Vector::<Point2f>::new(), Mat::default());
@@ -58,7 +55,7 @@ pub fn find_any_board(frame: &Frame) -> Result<Option<(usize, usize)>, BridgeErr
         find_chessboard_corners_sb_with_meta(&image, smallest, &mut corners, flags, &mut meta)
             .map_err(during("finding a board of any size"))?;
     let side = |count: i32| usize::try_from(count).unwrap_or(0);
-    Ok(found.then(|| (side(meta.cols()), side(meta.rows()))))
+    Ok(found.then(|| GridSize::new(side(meta.cols()), side(meta.rows()))))
 }
 
 #[cfg(test)]
@@ -67,6 +64,7 @@ mod tests {
     use crate::calibration::Camera;
     use crate::calibration::board::Board;
     use crate::core::frame::Pixels;
+    use crate::core::geometry;
     use crate::core::geometry::Pose;
     use crate::core::time::Stamp;
     use crate::core::units::Mm;
@@ -91,8 +89,8 @@ mod tests {
     #[test]
     fn all_corners_are_found_at_both_depths() {
         let eight = picture();
-        let found = find_board(&eight, (9, 6)).unwrap().unwrap();
-        let again = find_board(&ten_bits(&eight), (9, 6)).unwrap().unwrap();
+        let found = find_board(&eight, GridSize::new(9, 6)).unwrap().unwrap();
+        let again = find_board(&ten_bits(&eight), GridSize::new(9, 6)).unwrap().unwrap();
         assert_eq!(found.len(), 54);
         for (a, b) in found.iter().zip(&again) {
             assert!((a - b).norm() < 0.5, "{a} {b}");
@@ -101,13 +99,18 @@ mod tests {
 
     #[test]
     fn no_board_and_another_board_are_none() {
-        let empty =
-            Frame::new(0, Stamp::START, (400, 300), Pixels::Grey8(vec![90; 400 * 300])).unwrap();
-        assert_eq!(find_board(&empty, (9, 6)).unwrap(), None);
+        let empty = Frame::new(
+            0,
+            Stamp::START,
+            geometry::Size::new(400, 300),
+            Pixels::Grey8(vec![90; 400 * 300]),
+        )
+        .unwrap();
+        assert_eq!(find_board(&empty, GridSize::new(9, 6)).unwrap(), None);
         assert_eq!(find_any_board(&empty).unwrap(), None);
         let other = picture();
-        assert_eq!(find_board(&other, (11, 8)).unwrap(), None);
-        let (columns, rows) = find_any_board(&other).unwrap().unwrap();
+        assert_eq!(find_board(&other, GridSize::new(11, 8)).unwrap(), None);
+        let GridSize { columns, rows } = find_any_board(&other).unwrap().unwrap();
         assert_eq!((columns.max(rows), columns.min(rows)), (9, 6));
     }
 }

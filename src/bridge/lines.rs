@@ -46,7 +46,7 @@ pub fn canny_hough(
     const TASK: &str = "finding straight edges";
     prepare();
     if !roi.fits(frame.size()) || roi.width == 0 || roi.height == 0 {
-        let (width, height) = frame.size();
+        let (width, height) = (frame.width(), frame.height());
         let what = format!("{roi:?} is not within a picture of {width}x{height} px");
         return Err(BridgeError { task: TASK, what });
     }
@@ -123,6 +123,7 @@ fn coordinate(px: usize) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::core::geometry;
     use crate::core::time::Stamp;
 
     const SETTINGS: EdgeSettings = EdgeSettings {
@@ -137,7 +138,7 @@ mod tests {
     fn bar() -> Frame {
         let row = (0..200).map(|x| if (60..140).contains(&x) { 200 } else { 30 });
         let pixels = row.cycle().take(200 * 120).collect();
-        Frame::new(0, Stamp::START, (200, 120), Pixels::Grey8(pixels)).unwrap()
+        Frame::new(0, Stamp::START, geometry::Size::new(200, 120), Pixels::Grey8(pixels)).unwrap()
     }
 
     #[test]
@@ -165,7 +166,13 @@ mod tests {
 
     #[test]
     fn an_even_picture_has_no_edges_and_a_region_outside_is_refused() {
-        let even = Frame::new(0, Stamp::START, (50, 50), Pixels::Grey16(vec![900; 2500])).unwrap();
+        let even = Frame::new(
+            0,
+            Stamp::START,
+            geometry::Size::new(50, 50),
+            Pixels::Grey16(vec![900; 2500]),
+        )
+        .unwrap();
         let roi = Roi { x: 0, y: 0, width: 50, height: 50 };
         assert_eq!(canny_hough(&even, roi, &SETTINGS).unwrap(), vec![]);
         let outside = Roi { x: 10, ..roi };

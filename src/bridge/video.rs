@@ -11,6 +11,7 @@ use opencv::videoio::{
 
 use super::{BridgeError, during, prepare};
 use crate::core::frame::{Channel, Frame, Layout, Pixels};
+use crate::core::geometry::Size;
 use crate::core::time::Stamp;
 
 /// Where moving pictures come from.
@@ -154,6 +155,6 @@ fn frame_of(
         _ => return Err(fault("only samples of 8 and 16 bits are measured".to_owned())),
     };
     let side = |px: i32| usize::try_from(px).unwrap_or(0);
-    Frame::new(seq, captured_at, (side(image.cols()), side(image.rows())), pixels)
+    Frame::new(seq, captured_at, Size::new(side(image.cols()), side(image.rows())), pixels)
         .map_err(|error| fault(error.to_string()))
 }

@@ -5,7 +5,7 @@ use nalgebra::{Point2, Point3};
 
 use super::dictionary::Dictionary;
 use super::equations::Corner;
-use crate::core::geometry::ImagePoint;
+use crate::core::geometry::{GridSize, ImagePoint};
 use crate::core::units::Mm;
 
 /// A checkerboard of `columns` by `rows` inner corners.
@@ -179,8 +179,8 @@ impl Board {
     }
 
     /// Inner corners along a row and along a column.
-    pub fn corners(&self) -> (usize, usize) {
-        (self.columns, self.rows)
+    pub fn corners(&self) -> GridSize {
+        GridSize { columns: self.columns, rows: self.rows }
     }
 
     /// The side of a square.

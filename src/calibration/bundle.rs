@@ -4,7 +4,8 @@
 
 use nalgebra::{DVector, SMatrix, SVector};
 
-use super::equations::{Corner, Elimination, Equations, Factor, Free, Model, Place, SHARED};
+use super::equations::{Corner, Equations, Free, Model, Place, SHARED};
+use super::factor::{Elimination, Factor};
 
 const MOST_STEPS: usize = 100;
 /// Damping at first, as a share of each equation's own weight.
@@ -15,6 +16,15 @@ const MOST_DAMPING: f64 = 1e12;
 /// Share of the squares by which a step must lessen them for another one to be
 /// worth while.
 const WORTH: f64 = 1e-13;
+
+/// What is roughly known before a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Guess {
+    /// The camera and the board's bend.
+    pub model: Model,
+    /// Where the boards lie, in the order of the pictures.
+    pub places: Vec<Place>,
+}
 
 /// What fits best.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,8 +46,8 @@ struct Step {
 /// Fits what is free to the boards that lie at each place, beginning with what is
 /// roughly known. `None` where a board is behind the camera from the start, or a
 /// number never becomes finite.
-pub fn fit(start: (Model, Vec<Place>), free: Free, boards: &[Vec<Vec<Corner>>]) -> Option<Fit> {
-    let (model, places) = start;
+pub fn fit(start: Guess, free: Free, boards: &[Vec<Vec<Corner>>]) -> Option<Fit> {
+    let Guess { model, places } = start;
     let squares_px2 = squares_px2(&model, &places, boards)?;
     let mut best = Fit { model, places, squares_px2 };
     let mut damping = DAMPING;

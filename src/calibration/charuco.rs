@@ -1,6 +1,11 @@
 //! Finds a board by the markers in its white squares: all of it need not be in the
 //! picture, and which way round it lies is known.
 
+mod error;
+mod layout;
+
+pub use error::NoMarkers;
+
 use nalgebra::{Matrix3, Point2};
 
 use super::board::{Board, Marks};
@@ -11,8 +16,9 @@ use super::marker;
 use super::marker::Marker;
 use crate::bridge::{self, BridgeError};
 use crate::core::frame::Frame;
-use crate::core::geometry::ImagePoint;
+use crate::core::geometry::{GridSize, ImagePoint};
 use crate::numeric::rank;
+use layout::Layout;
 
 /// How far a marker's corner may be off its place, over the side of a square.
 const OFF: f64 = 0.3;
@@ -44,66 +50,6 @@ const COMMON: usize = 250;
 /// Columns of inner corners that are tried where the markers do not fit.
 const COLUMNS: std::ops::RangeInclusive<usize> = 3..=40;
 
-/// Why no board with markers is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum NoMarkers {
-    /// There are none, or too few.
-    #[error("no board with markers of {} cells: {found} of them show", dictionary.name())]
-    None {
-        /// Markers of the right dictionary.
-        found: usize,
-        /// The dictionary.
-        dictionary: Dictionary,
-    },
-    /// There are others.
-    #[error("markers of {} cells show, not of {}: correct --dictionary", found.name(), expected.name())]
-    Other {
-        /// The dictionary of those that show.
-        found: Dictionary,
-        /// The one that was told.
-        expected: Dictionary,
-    },
-    /// They can be read in the mirror.
-    #[error(
-        "the board is mirrored: its markers can only be read in the mirror image; let the \
-         camera not flip its pictures, and look at the board itself"
-    )]
-    Mirrored,
-    /// They are not where they should be.
-    #[error(
-        "the markers are not in the order of a board with {}x{} inner corners: {fit} of {of} are \
-         where they should be{}", expected.0, expected.1, meant_text(*.meant)
-    )]
-    Order {
-        /// Markers that fit.
-        fit: usize,
-        /// Markers that were read.
-        of: usize,
-        /// The board's inner corners along a row and along a column.
-        expected: (usize, usize),
-        /// Inner corners along a row of a board that they would fit.
-        meant: Option<usize>,
-    },
-    /// They have another size.
-    #[error(
-        "the markers measure {found_percent} % of a square's side, not {expected_percent} %: correct \
-         --marker-mm or --square-mm"
-    )]
-    Size {
-        /// Their size, over a square's side \[%\].
-        found_percent: u32,
-        /// What was told \[%\].
-        expected_percent: u32,
-    },
-}
-
-fn meant_text(meant: Option<usize>) -> String {
-    meant.map_or_else(
-        || "; it is another board, or its markers were printed in another order".to_owned(),
-        |columns| format!("; they fit one of {columns} columns: count again and correct --board"),
-    )
-}
-
 /// The inner corners of a board with markers \[px\], to about a pixel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
@@ -113,47 +59,6 @@ pub struct Found {
     pub is_beside: Vec<bool>,
     /// Whether the upper left square, or else the one beside it, has a marker.
     pub first_has_marker: bool,
-}
-
-/// Where markers are on a board.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Layout {
-    /// Squares along a row.
-    columns: usize,
-    /// Squares along a column; a number beyond them has no place.
-    rows: usize,
-    /// Whether the upper left square has one: as OpenCV before 4.6 had it on boards with
-    /// an even number of rows of squares.
-    first_has_marker: bool,
-}
-
-impl Layout {
-    fn of(board: &Board, first_has_marker: bool) -> Self {
-        let (columns, rows) = board.corners();
-        Self { columns: columns + 1, rows: rows + 1, first_has_marker }
-    }
-
-    /// Column and row of the square with a marker.
-    fn square(&self, number: usize) -> Option<(usize, usize)> {
-        let Self { columns, rows, first_has_marker } = *self;
-        // Two rows together have as many markers as a row has squares.
-        let (pair, rest) = (number / columns, number % columns);
-        let in_even = if first_has_marker { columns.div_ceil(2) } else { columns / 2 };
-        let (row, place) =
-            if rest < in_even { (2 * pair, rest) } else { (2 * pair + 1, rest - in_even) };
-        let starts = usize::from((row % 2 == 0) != first_has_marker);
-        (row < rows).then_some((2 * place + starts, row))
-    }
-
-    /// The corners of a marker, in squares from the board's upper left corner.
-    #[expect(clippy::cast_precision_loss, reason = "at most 100 squares a side")]
-    fn corners(&self, number: usize, clear: f64) -> Option<[Point2<f64>; 4]> {
-        let (column, row) = self.square(number)?;
-        let (left, top) = (column as f64 + clear, row as f64 + clear);
-        let side = 1.0 - 2.0 * clear;
-        let [right, bottom] = [left + side, top + side];
-        Some([[left, top], [right, top], [right, bottom], [left, bottom]].map(Point2::from))
-    }
 }
 
 /// A marker and where it is on the board, in squares.
@@ -227,18 +132,10 @@ fn among(
         .reduce(|a, b| if b.0.len() > a.0.len() { b } else { a })
         .unwrap_or_else(|| (Vec::new(), Layout::of(board, false)));
     if fitting.len() < FEWEST || share(fitting.len(), markers.len()) < MOST_FIT {
-        return Err(reason(board, dictionary, grey, quads, (fitting.len(), markers.len())));
+        return Err(reason(board, dictionary, grey, quads, fitting.len(), markers.len()));
     }
     check_size(&fitting, clear)?;
     Ok(foretold(board, &fitting, layout.first_has_marker))
-}
-
-impl Layout {
-    /// Markers of a board, whichever of its squares have them.
-    fn count(board: &Board) -> usize {
-        let (columns, rows) = board.corners();
-        ((columns + 1) * (rows + 1)).div_ceil(2)
-    }
 }
 
 #[expect(clippy::cast_precision_loss, reason = "a count of markers")]
@@ -339,7 +236,7 @@ fn size(placed: &[Placed], clear: f64) -> Option<f64> {
 /// Where the board's corners should be by the markers about them.
 #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
 fn foretold(board: &Board, placed: &[Placed], first_has_marker: bool) -> Found {
-    let (columns, rows) = board.corners();
+    let GridSize { columns, rows } = board.corners();
     let (mut expected, mut is_beside) = (Vec::new(), Vec::new());
     for i in 0..columns * rows {
         let at = Point2::new((i % columns) as f64 + 1.0, (i / columns) as f64 + 1.0);
@@ -358,7 +255,8 @@ fn reason(
     dictionary: Dictionary,
     grey: &Grey<'_>,
     quads: &[[ImagePoint; 4]],
-    (fit, of): (usize, usize),
+    fit: usize,
+    of: usize,
 ) -> NoMarkers {
     let is_board = |quads: &[[ImagePoint; 4]], dictionary| is_board(grey, quads, dictionary);
     if is_board(&marker::mirrored(quads), dictionary) {
@@ -368,7 +266,7 @@ fn reason(
     let meant = columns_of(&markers, board.clear());
     let expected = board.corners();
     if meant.is_some() || fit >= FEWEST {
-        let meant = meant.filter(|&columns| columns != expected.0);
+        let meant = meant.filter(|&columns| columns != expected.columns);
         return NoMarkers::Order { fit, of: of.max(markers.len()), expected, meant };
     }
     let others = Dictionary::ALL.into_iter().filter(|&other| other != dictionary);
@@ -402,27 +300,4 @@ fn columns_of(markers: &[Marker], clear: f64) -> Option<usize> {
         .filter(|&(columns, fit)| is_enough(columns, fit))
         .max_by_key(|&(_, fit)| fit)
         .map(|(columns, _)| columns)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn markers_are_numbered_row_by_row_over_the_white_squares() {
-        for columns in [6, 7] {
-            for first_has_marker in [false, true] {
-                let layout = Layout { columns, rows: 5, first_has_marker };
-                let white = (0..5)
-                    .flat_map(|row| (0..columns).map(move |column| (column, row)))
-                    .filter(|(column, row)| ((column + row) % 2 == 0) == first_has_marker);
-                let mut count = 0;
-                for (number, square) in white.enumerate() {
-                    assert_eq!(layout.square(number), Some(square), "{layout:?}");
-                    count += 1;
-                }
-                assert_eq!(layout.square(count), None);
-            }
-        }
-    }
 }

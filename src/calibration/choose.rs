@@ -5,11 +5,12 @@
 use nalgebra::{DVector, SMatrix, SVector};
 
 use super::bundle;
-use super::bundle::Fit;
-use super::equations::{Factor, Free, SHARED};
+use super::bundle::{Fit, Guess};
+use super::equations::{Free, SHARED, only};
+use super::factor::Factor;
 use super::lens::Lens;
 use super::pull::Pull;
-use super::solve::{Views, only};
+use super::solve::views::Views;
 
 /// Share of the smallest held-out error by which a lens may foretell worse and be
 /// taken for as good. Of those that are as good the one with the most coefficients is
@@ -39,9 +40,7 @@ pub struct Trial {
 fn fits(views: &Views, most: Lens) -> Vec<(Fit, Trial)> {
     let mut fits: Vec<(Fit, Trial)> = Vec::new();
     for lens in Lens::ALL.into_iter().filter(|lens| *lens <= most) {
-        let start = fits
-            .last()
-            .map_or_else(|| views.start.clone(), |(fit, _)| (fit.model, fit.places.clone()));
+        let start = fits.last().map_or_else(|| views.start.clone(), |(fit, _)| guess(fit));
         let free = Free { lens: Some(lens), bend: false };
         if let Some(fit) = bundle::fit(start, free, &views.boards) {
             let trial = trial(views, &fit, free);
@@ -51,6 +50,11 @@ fn fits(views: &Views, most: Lens) -> Vec<(Fit, Trial)> {
     fits
 }
 
+/// Where another fit begins.
+fn guess(fit: &Fit) -> Guess {
+    Guess { model: fit.model, places: fit.places.clone() }
+}
+
 /// The best choice and all that was tried. `None` where no lens leads to a camera.
 pub(super) fn best(views: &Views) -> Option<(Fit, Free, Vec<Trial>)> {
     let mut fits = fits(views, Lens::Rational);
@@ -58,8 +62,8 @@ pub(super) fn best(views: &Views) -> Option<(Fit, Free, Vec<Trial>)> {
     let mut trials: Vec<Trial> = fits.iter().map(|(_, trial)| *trial).collect();
     let (fit, chosen) = fits.swap_remove(chosen);
     let free = Free { bend: true, ..chosen.free };
-    let bent = bundle::fit((fit.model, fit.places.clone()), free, &views.boards)
-        .map(|fit| (trial(views, &fit, free), fit));
+    let bent =
+        bundle::fit(guess(&fit), free, &views.boards).map(|fit| (trial(views, &fit, free), fit));
     if let Some((trial, bent)) = bent {
         trials.push(trial);
         let foretells = trial.held_out_px.zip(chosen.held_out_px).is_some_and(|(b, f)| b < f);

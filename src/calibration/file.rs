@@ -149,7 +149,8 @@ fn read_bed(table: &Table<'_>) -> Option<(Pose, Mm)> {
 /// A camera model and bed plane as the text of a calibration file; each note
 /// becomes a comment at its head. Numbers keep every digit.
 pub fn to_toml(
-    (camera, bed): (&Camera, &Pose),
+    camera: &Camera,
+    bed: &Pose,
     image_size_px: [u32; 2],
     robot_z: Mm,
     quality: Option<Quality>,
@@ -295,7 +296,7 @@ mod tests {
             uncertainty: Some(Uncertainty::of(&some_covariance())),
         });
         let notes = ["made by hand\nfor a test".to_string()];
-        let text = to_toml((&camera, &bed), [640, 480], Mm::constant(12.5), quality, &notes);
+        let text = to_toml(&camera, &bed, [640, 480], Mm::constant(12.5), quality, &notes);
         let Calibration::Full { image_size_px, camera: c, bed: b, robot_z, quality: q } =
             parse("x", &text).unwrap()
         else {
@@ -315,7 +316,7 @@ mod tests {
             distortion: [-0.2, 0.03, 1e-3, -1e-4, 0.01, 0.04, -0.01, 0.002],
         };
         let bed = Pose::new(Vector3::new(3.0, 0.1, -0.2), Vector3::new(1.5, -2.25, 400.125));
-        let text = to_toml((&camera, &bed), [640, 480], Mm::ZERO, None, &[]);
+        let text = to_toml(&camera, &bed, [640, 480], Mm::ZERO, None, &[]);
         let Calibration::Full { camera: back, .. } = parse("x", &text).unwrap() else {
             unreachable!()
         };

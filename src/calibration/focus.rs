@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 
 use super::board::Board;
 use super::grey::Grey;
-use crate::core::geometry::ImagePoint;
+use crate::core::geometry::{GridSize, ImagePoint};
 use crate::numeric::rank;
 
 /// Blur from which on a picture is refused \[px\], or as a share of a square's side.
@@ -57,7 +57,7 @@ impl Focus {
     /// Of a board whose corners were found, row by row as far as they were. `None` where
     /// no edge between them shows.
     pub fn of(board: &Board, grey: &Grey<'_>, corners: &[Option<ImagePoint>]) -> Option<Self> {
-        let (columns, rows) = board.corners();
+        let GridSize { columns, rows } = board.corners();
         if corners.len() != columns * rows {
             return None;
         }

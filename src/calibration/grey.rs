@@ -1,14 +1,14 @@
 //! Grey values at pixels and between them, for what is read about a board's squares.
 
 use crate::core::frame::{Frame, Pixels};
-use crate::core::geometry::ImagePoint;
+use crate::core::geometry::{ImagePoint, Size};
 
 /// The grey values of a picture. Those of 16 bits are scaled so that the brightest is
 /// 255, because 10 or 12 bits are often all that is used of 16.
 #[derive(Debug)]
 pub struct Grey<'a> {
     pixels: &'a Pixels,
-    size: (usize, usize),
+    size: Size,
     scale: f64,
 }
 
@@ -25,13 +25,13 @@ impl<'a> Grey<'a> {
     }
 
     /// Columns and rows \[px\].
-    pub fn size(&self) -> (usize, usize) {
+    pub fn size(&self) -> Size {
         self.size
     }
 
     /// The value of a pixel; 0 outside the picture.
     pub fn pixel(&self, x: usize, y: usize) -> f64 {
-        let index = y * self.size.0 + x;
+        let index = y * self.size.width + x;
         let value = match self.pixels {
             Pixels::Grey8(values) => values.get(index).copied().map(f64::from),
             Pixels::Grey16(values) => values.get(index).copied().map(f64::from),
@@ -48,7 +48,7 @@ impl<'a> Grey<'a> {
         reason = "checked to lie in the picture"
     )]
     pub fn at(&self, px: ImagePoint) -> Option<f64> {
-        let (width, height) = self.size;
+        let Size { width, height } = self.size;
         let inside = |at: f64, count: usize| at >= 0.0 && at < count as f64 - 1.0;
         if !inside(px.x, width) || !inside(px.y, height) {
             return None;

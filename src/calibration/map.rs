@@ -8,8 +8,17 @@ use super::covariance::Covariance;
 use crate::core::geometry::ImagePoint;
 use crate::core::units::Mm;
 
-/// Cells along the picture and across it.
-pub const CELLS: (u32, u32) = (16, 12);
+/// Cells that an image is cut into.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cells {
+    /// How many along a row.
+    pub columns: u32,
+    /// How many along a column.
+    pub rows: u32,
+}
+
+/// Cells of a map of widths.
+pub const CELLS: Cells = Cells { columns: 16, rows: 12 };
 
 /// What a calibration leaves in the width of a bead on one surface.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,10 +106,8 @@ fn beads(
 }
 
 /// Middles of so many cells along and across an image of this size \[px\], row by row.
-pub(super) fn middles(
-    size_px: [f64; 2],
-    (columns, rows): (u32, u32),
-) -> impl Iterator<Item = ImagePoint> {
+pub(super) fn middles(size_px: [f64; 2], cells: Cells) -> impl Iterator<Item = ImagePoint> {
+    let Cells { columns, rows } = cells;
     let part = |at: u32, count: u32| (f64::from(at) + 0.5) / f64::from(count);
     (0..columns * rows).map(move |i| {
         let (x, y) = (part(i % columns, columns), part(i / columns, rows));
@@ -180,7 +187,7 @@ mod tests {
     fn the_picture_that_is_asked_for_brings_what_is_said_of_it() {
         let (solution, covariance) = covariance();
         let heights = [Mm::ZERO, Mm::constant(20.0)];
-        let next = next_view::best(&board(), &solution, &covariance, (40.0, &heights)).unwrap();
+        let next = next_view::best(&board(), &solution, &covariance, 40.0, &heights).unwrap();
         let (before, after) = next.share;
         // What it begins with is what the maps tell.
         let worst = heights

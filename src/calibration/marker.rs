@@ -115,7 +115,7 @@ impl Cells {
         let pairs: Vec<_> = square.into_iter().zip(*quad).collect();
         let map = homography::homography(&pairs)?;
         let values: Vec<f64> = (0..all * all)
-            .map(|i| colour(grey, &map, ((i % all) as f64, (i / all) as f64)))
+            .map(|i| colour(grey, &map, (i % all) as f64, (i / all) as f64))
             .collect::<Option<_>>()?;
         let (dark, bright) = values
             .iter()
@@ -148,7 +148,7 @@ impl Cells {
 }
 
 /// Mean grey value about the middle of a cell; `None` where it leaves the picture.
-fn colour(grey: &Grey<'_>, map: &Matrix3<f64>, (column, row): (f64, f64)) -> Option<f64> {
+fn colour(grey: &Grey<'_>, map: &Matrix3<f64>, column: f64, row: f64) -> Option<f64> {
     let part = |k: u32| 0.5 + PART * (f64::from(k) / f64::from(PLACES - 1) - 0.5);
     let mut sum = 0.0;
     for i in 0..PLACES * PLACES {

@@ -22,13 +22,22 @@ const PLACES: u32 = 3;
 /// Part of what is open that a picture must take away to be worth while.
 const WORTH: f64 = 0.03;
 
+/// A point of the picture, as fractions of its width and height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RelativePoint {
+    /// From the left.
+    pub x: f64,
+    /// From the top.
+    pub y: f64,
+}
+
 /// A picture that would help.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NextView {
     /// How the board is held.
     pub hold: Hold,
-    /// Middle of the board in the picture, as parts of its width and height.
-    pub at: (f64, f64),
+    /// Middle of the board in the picture.
+    pub at: RelativePoint,
     /// What a width is known to where boards were seen, before and after it: share of
     /// the width.
     pub share: (f64, f64),
@@ -59,7 +68,8 @@ pub fn best(
     board: &Board,
     solution: &Solution,
     covariance: &Covariance,
-    (bead_mm, heights): (f64, &[Mm]),
+    bead_mm: f64,
+    heights: &[Mm],
 ) -> Option<NextView> {
     let told = heights.iter().flat_map(|&height| {
         map::where_seen(covariance, bead_mm, height).into_iter().map(move |ends| (ends, height))
@@ -82,7 +92,7 @@ pub fn best(
                     share::largest(&with, &self::readings(&with, &beads))?
                 }
                 Hold::Free { .. } => {
-                    let pose = pose(board, covariance, (at, hold), distance_mm)?;
+                    let pose = pose(board, covariance, at, hold, distance_mm)?;
                     let corners = seen_whole(board, covariance, &pose)?;
                     share::largest(&covariance.with_another(&pose, &corners)?, &readings)?
                 }
@@ -101,11 +111,11 @@ fn readings(covariance: &Covariance, beads: &[Bead]) -> Vec<Reading> {
     beads.iter().filter_map(|&(ends, height)| covariance.width(ends, height)).collect()
 }
 
-fn candidates() -> Vec<((f64, f64), Hold)> {
+fn candidates() -> Vec<(RelativePoint, Hold)> {
     let part = |i: u32| (f64::from(i) + 0.5) / f64::from(PLACES);
     let mut all = Vec::new();
     for place in 0..PLACES * PLACES {
-        let at = (part(place % PLACES), part(place / PLACES));
+        let at = RelativePoint { x: part(place % PLACES), y: part(place / PLACES) };
         all.push((at, Hold::OnBed));
         for distance in DISTANCES {
             all.push((at, Hold::Free { nearer: (0, 0), tilt_deg: 0.0, distance }));
@@ -119,9 +129,9 @@ fn candidates() -> Vec<((f64, f64), Hold)> {
     all
 }
 
-fn place_px(covariance: &Covariance, at: (f64, f64)) -> ImagePoint {
+fn place_px(covariance: &Covariance, at: RelativePoint) -> ImagePoint {
     let [width, height] = covariance.image_size_px().map(f64::from);
-    ImagePoint::new(at.0 * width, at.1 * height)
+    ImagePoint::new(at.x * width, at.y * height)
 }
 
 fn middle_mm(board: &Board) -> Vector3<f64> {
@@ -130,7 +140,7 @@ fn middle_mm(board: &Board) -> Vector3<f64> {
 
 /// Where a board would lie on the bed, turned like the first one, with its middle at a
 /// place of the picture.
-fn on_bed(board: &Board, covariance: &Covariance, at: (f64, f64)) -> Option<[f64; 3]> {
+fn on_bed(board: &Board, covariance: &Covariance, at: RelativePoint) -> Option<[f64; 3]> {
     let map = covariance.surface(covariance.thickness());
     let on_face = map.to_mm(place_px(covariance, at))?;
     // The bed's axes are the board's, with y turned over if z is.
@@ -148,7 +158,8 @@ fn on_bed(board: &Board, covariance: &Covariance, at: (f64, f64)) -> Option<[f64
 fn pose(
     board: &Board,
     covariance: &Covariance,
-    (at, hold): ((f64, f64), Hold),
+    at: RelativePoint,
+    hold: Hold,
     distance_mm: f64,
 ) -> Option<Pose> {
     let Hold::Free { nearer, tilt_deg, distance } = hold else { return None };
@@ -206,11 +217,11 @@ impl std::fmt::Display for NextView {
     }
 }
 
-fn place_words((x, y): (f64, f64)) -> String {
+fn place_words(at: RelativePoint) -> String {
     let third = |part: f64, words: [&'static str; 3]| {
         words[usize::from(part > 0.34) + usize::from(part > 0.66)]
     };
-    match (third(y, ["upper", "", "lower"]), third(x, ["left", "", "right"])) {
+    match (third(at.y, ["upper", "", "lower"]), third(at.x, ["left", "", "right"])) {
         ("", "") => "middle of the picture".to_owned(),
         ("", across) => format!("{across} part of the picture"),
         (down, "") => format!("{down} part of the picture"),

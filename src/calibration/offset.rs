@@ -11,7 +11,7 @@ use nalgebra::{Point2, Vector2};
 
 use super::board::{Board, Seen};
 use super::{Calibration, SurfaceMap};
-use crate::core::geometry::ImagePoint;
+use crate::core::geometry::{GridSize, ImagePoint};
 use crate::core::units::Mm;
 
 /// Step of the height for what a wrong height does to the middle of the gauge \[mm\].
@@ -166,7 +166,7 @@ pub fn find(
     if calibration.image_size_px().is_none() {
         return Err(OffsetError::NoCamera);
     }
-    let (columns, rows) = board.corners();
+    let GridSize { columns, rows } = board.corners();
     if board.is_symmetric() && columns == rows {
         return Err(OffsetError::Square(columns));
     }
@@ -218,7 +218,7 @@ fn first_corner(
     face: &SurfaceMap,
     turned: bool,
 ) -> ImagePoint {
-    let (columns, rows) = board.corners();
+    let GridSize { columns, rows } = board.corners();
     let index = if turned { columns * rows - 1 } else { 0 };
     let seen = corners.iter().find(|corner| corner.index == index).map(|corner| corner.px);
     let there = || face.to_px(lies.place(board, [0.0; 2], turned));
@@ -270,7 +270,7 @@ impl Lies {
     /// \[mm\].
     #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
     fn place(&self, board: &Board, [x, y]: [f64; 2], is_turned: bool) -> Point2<f64> {
-        let (columns, rows) = board.corners();
+        let GridSize { columns, rows } = board.corners();
         let last = [(columns - 1) as f64, (rows - 1) as f64];
         let [x, y] = if is_turned { [last[0] - x, last[1] - y] } else { [x, y] };
         let on_board = mirrored(Point2::new(x, y) * board.square().get());

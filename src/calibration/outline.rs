@@ -4,7 +4,7 @@
 
 use super::board::Board;
 use super::grey::Grey;
-use crate::core::geometry::ImagePoint;
+use crate::core::geometry::{GridSize, ImagePoint};
 use crate::numeric::rank;
 
 /// Difference between squares of both colours from which on a row of squares belongs
@@ -62,7 +62,7 @@ pub struct Outline {
 /// leave the picture.
 pub fn look(board: &Board, grey: &Grey<'_>, corners: &[ImagePoint]) -> Outline {
     let mut outline = Outline::default();
-    let (columns, rows) = board.corners();
+    let GridSize { columns, rows } = board.corners();
     if corners.len() != columns * rows {
         return outline;
     }

@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Rotation3, Vector3};
 
 use super::bundle;
+use super::bundle::Guess;
 use super::equations::{Corner, Free, Model, Place};
 use super::solve;
 use crate::core::geometry::Pose;
@@ -30,7 +31,7 @@ impl OnBed {
             boards.iter().map(|corners| solve::pose(model, corners)).collect::<Option<_>>()?;
         let (first, rest) = poses.split_first()?;
         let others = rest.iter().map(|pose| in_plane_of(first, pose)).collect();
-        let start = (*model, vec![Place { pose: *first, others }]);
+        let start = Guess { model: *model, places: vec![Place { pose: *first, others }] };
         let all = [boards];
         let fit = bundle::fit(start, Free::PLACES, &all)?;
         let [boards] = all;

@@ -4,8 +4,9 @@
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::bundle::Fit;
-use super::equations::{Elimination, Equations, Factor, Free, SHARED};
-use super::solve::{Views, only};
+use super::equations::{Equations, Free, SHARED, only};
+use super::factor::{Elimination, Factor};
+use super::solve::views::Views;
 
 /// Design effect below which it is no less but by chance: its own standard error is some
 /// 0.16 with a dozen pictures. Not 1, so that it is right on average for independent corners.

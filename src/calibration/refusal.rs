@@ -3,8 +3,14 @@
 use super::board::NotABoard;
 use super::charuco::NoMarkers;
 use super::outline::Side;
-use super::sighting::{LEAST_CORNERS, LEAST_LINES};
 use crate::bridge::BridgeError;
+use crate::core::geometry::GridSize;
+
+/// Corners of a board with markers that must show, in [`LEAST_LINES`] of its rows and as
+/// many columns.
+pub const LEAST_CORNERS: usize = 8;
+/// The rows and the columns.
+pub const LEAST_LINES: usize = 3;
 
 /// Why a picture is not used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -24,13 +30,13 @@ pub enum Refusal {
     #[error(
         "a board with {}x{} inner corners shows, not one with {}x{}: see that all of it is in \
          the picture, or correct --board",
-        found.0, found.1, expected.0, expected.1
+        found.columns, found.rows, expected.columns, expected.rows
     )]
     OtherBoard {
         /// Inner corners that show, along a row and along a column.
-        found: (usize, usize),
+        found: GridSize,
         /// Those of the board that was told.
-        expected: (usize, usize),
+        expected: GridSize,
     },
     /// A larger board, of which the one that was told would be a part.
     #[error(

@@ -3,6 +3,7 @@
 
 use nalgebra::Vector2;
 
+use super::map::Cells;
 use super::{SurfaceMap, map};
 use crate::core::geometry::{ImagePoint, Roi};
 
@@ -14,7 +15,7 @@ pub struct ShareMap {
     /// Size of the image \[px\].
     pub image_size_px: [u32; 2],
     /// Cells along the image and across it.
-    pub counts: (u32, u32),
+    pub counts: Cells,
     /// Of a bead whose middle is in the middle of a cell, row by row. `None` where such a
     /// bead is not seen whole.
     pub cells: Vec<Option<f64>>,
@@ -32,7 +33,7 @@ pub struct Bead {
 impl ShareMap {
     /// On a surface. `None` for a calibration that knows no image, or no more of widths than
     /// one number.
-    pub fn of(surface: &SurfaceMap, bead: &Bead, counts: (u32, u32)) -> Option<Self> {
+    pub fn of(surface: &SurfaceMap, bead: &Bead, counts: Cells) -> Option<Self> {
         let image_size_px = surface.image_size_px()?;
         surface.uncertainty()?;
         let cells = map::middles(image_size_px.map(f64::from), counts)
@@ -44,7 +45,7 @@ impl ShareMap {
     /// The part of the image that a cell covers: first column and row, last column and row
     /// \[px\].
     pub fn cell_px(&self, cell: u32) -> [f64; 4] {
-        let (columns, rows) = self.counts;
+        let Cells { columns, rows } = self.counts;
         let [width, height] = self.image_size_px.map(f64::from);
         let edge = |at: u32, count: u32, side: f64| f64::from(at) / f64::from(count) * side - 0.5;
         let (column, row) = (cell % columns, cell / columns);
@@ -122,21 +123,23 @@ mod tests {
     #[test]
     fn a_width_is_known_less_well_beyond_where_boards_were_seen() {
         let bead = Bead { width_mm: 40.0, across: Vector2::x() };
-        let map = ShareMap::of(&surface(), &bead, (8, 6)).unwrap();
+        let map = ShareMap::of(&surface(), &bead, Cells { columns: 8, rows: 6 }).unwrap();
         let at = |column: usize, row: usize| map.cells[row * 8 + column];
         let (middle, corner) = (at(3, 3).unwrap(), at(1, 0).unwrap());
         assert!(corner > 2.0 * middle, "{corner} {middle}");
         // The bead does not fit beside the left side of the image.
         assert_eq!(at(0, 3), None);
         let higher = surface().with_height_sigma(Mm::constant(1.0));
-        let with_height = ShareMap::of(&higher, &bead, (8, 6)).unwrap().cells[3 * 8 + 3].unwrap();
+        let with_height =
+            ShareMap::of(&higher, &bead, Cells { columns: 8, rows: 6 }).unwrap().cells[3 * 8 + 3]
+                .unwrap();
         assert!(with_height > middle && with_height > 1e-3, "{with_height}");
     }
 
     #[test]
     fn a_gauge_is_in_the_cells_that_it_covers() {
         let bead = Bead { width_mm: 40.0, across: Vector2::x() };
-        let map = ShareMap::of(&surface(), &bead, (8, 6)).unwrap();
+        let map = ShareMap::of(&surface(), &bead, Cells { columns: 8, rows: 6 }).unwrap();
         let cells = |gauge: Roi| (0..48).filter(|&cell| map.is_in(gauge, cell)).collect::<Vec<_>>();
         // Cells are 90 px wide and high.
         let gauge = Roi { x: 180, y: 190, width: 270, height: 60 };
@@ -147,6 +150,9 @@ mod tests {
     #[test]
     fn a_single_number_has_no_map() {
         let bead = Bead { width_mm: 40.0, across: Vector2::x() };
-        assert_eq!(ShareMap::of(&SurfaceMap::from_scale(0.1), &bead, (8, 6)), None);
+        assert_eq!(
+            ShareMap::of(&SurfaceMap::from_scale(0.1), &bead, Cells { columns: 8, rows: 6 }),
+            None
+        );
     }
 }

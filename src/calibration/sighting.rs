@@ -8,20 +8,14 @@ use super::focus::{Focus, Unsharp};
 use super::grey::Grey;
 use super::outline;
 use super::outline::Outline;
-use super::refusal::Refusal;
+use super::refusal::{LEAST_CORNERS, LEAST_LINES, Refusal};
 use crate::bridge;
 use crate::core::frame::Frame;
-use crate::core::geometry::ImagePoint;
+use crate::core::geometry::{GridSize, ImagePoint};
 
 /// Mean shift of the corners below which two pictures show the board in one place
 /// \[px\]: they say the same twice, and count as one.
 const SAME_PLACE_PX: f64 = 1.0;
-/// Corners of a board with markers that must show, in [`LEAST_LINES`] of its rows and as
-/// many columns.
-pub const LEAST_CORNERS: usize = 8;
-/// The rows and the columns.
-pub const LEAST_LINES: usize = 3;
-
 /// The board as one picture shows it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sighting {
@@ -62,7 +56,7 @@ fn checkerboard(
     grey: &Grey<'_>,
 ) -> Result<Vec<Option<ImagePoint>>, Refusal> {
     let expected = board.corners();
-    let (columns, rows) = expected;
+    let GridSize { columns, rows } = expected;
     let Some(corners) = bridge::find_board(frame, expected)? else {
         return Err(match bridge::find_any_board(frame)? {
             Some(found) if turned_like(found, expected) != expected => {
@@ -113,7 +107,7 @@ fn with_markers(
         .zip(found.is_beside)
         .map(|(px, is_beside)| px.filter(|_| is_beside))
         .collect();
-    let (columns, _) = board.corners();
+    let columns = board.corners().columns;
     let lines = |line: &dyn Fn(usize) -> usize| {
         let mut lines: Vec<usize> =
             (0..seen.len()).filter(|&i| seen[i].is_some()).map(line).collect();
@@ -131,8 +125,10 @@ fn with_markers(
 
 /// The longer side first if it is so on the other board: a plain board does not tell
 /// its rows from its columns.
-fn turned_like((a, b): (usize, usize), (columns, rows): (usize, usize)) -> (usize, usize) {
-    if (a >= b) == (columns >= rows) { (a, b) } else { (b, a) }
+fn turned_like(found: GridSize, expected: GridSize) -> GridSize {
+    let GridSize { columns, rows } = found;
+    let is_alike = (columns >= rows) == (expected.columns >= expected.rows);
+    if is_alike { found } else { GridSize { columns: rows, rows: columns } }
 }
 
 /// What became of pictures, each with its name.
@@ -181,7 +177,7 @@ pub fn is_same_place(board: &Board, a: &[Seen], b: &[Seen]) -> bool {
 /// Mean distance between the corners that two pictures share \[px\], whichever way
 /// round a symmetric board was counted. `None` without such corners.
 pub fn shift_px(board: &Board, a: &[Seen], b: &[Seen]) -> Option<f64> {
-    let (columns, rows) = board.corners();
+    let GridSize { columns, rows } = board.corners();
     let last = columns * rows - 1;
     let straight = mean_distance(a, b, |index| index);
     let turned =

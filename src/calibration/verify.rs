@@ -150,7 +150,7 @@ fn worst(
     on_bed: &[Point2<f64>],
     rms_px: f64,
 ) -> Option<(f64, f64, (f64, f64, f64))> {
-    let (columns, _) = board.corners();
+    let columns = board.corners().columns;
     let mut worst: Option<(f64, f64, (f64, f64, f64))> = None;
     for (i, a) in corners.iter().enumerate() {
         for (j, b) in corners.iter().enumerate().skip(i + 1) {
@@ -159,7 +159,7 @@ fn worst(
             let (along, total) = if row == other_row {
                 (column.abs_diff(other_column), columns)
             } else if column == other_column {
-                (row.abs_diff(other_row), board.corners().1)
+                (row.abs_diff(other_row), board.corners().rows)
             } else {
                 continue;
             };

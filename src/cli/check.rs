@@ -14,6 +14,7 @@ use crate::assembly::{ExtruderSide, LoadedCell, beyond, steady};
 use crate::calibration::Calibration;
 use crate::cell::Cell;
 use crate::cell::file::{Purpose, RunPart, Source};
+use crate::core::geometry::Size;
 use crate::core::time::Span;
 use crate::core::units::Mm;
 use crate::extruder::start_stop::Pause;
@@ -244,7 +245,7 @@ fn check_gauge(loaded: &LoadedCell) -> Result<(), WrongArguments> {
         return Ok(());
     };
     let roi = loaded.cell.gauge.roi;
-    if roi.fits((width as usize, height as usize)) {
+    if roi.fits(Size::new(width as usize, height as usize)) {
         return Ok(());
     }
     Err(WrongArguments::new(format!(

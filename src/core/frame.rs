@@ -5,6 +5,7 @@ mod channel;
 
 pub use channel::{Channel, Layout, Sample, UnknownChannel};
 
+use super::geometry::Size;
 use super::time::Stamp;
 
 /// Grey values, row by row, without padding.
@@ -38,8 +39,7 @@ pub struct Frame {
     pub seq: u64,
     /// When the light fell on the sensor, as near as the source can tell.
     pub captured_at: Stamp,
-    width: usize,
-    height: usize,
+    size: Size,
     pixels: Pixels,
 }
 
@@ -61,28 +61,29 @@ impl Frame {
     pub fn new(
         seq: u64,
         captured_at: Stamp,
-        (width, height): (usize, usize),
+        size: Size,
         pixels: Pixels,
     ) -> Result<Self, WrongSize> {
+        let Size { width, height } = size;
         if width.checked_mul(height) != Some(pixels.len()) || pixels.is_empty() {
             return Err(WrongSize { width, height, found: pixels.len() });
         }
-        Ok(Self { seq, captured_at, width, height, pixels })
+        Ok(Self { seq, captured_at, size, pixels })
     }
 
     /// Number of columns \[px\].
     pub fn width(&self) -> usize {
-        self.width
+        self.size.width
     }
 
     /// Number of rows \[px\].
     pub fn height(&self) -> usize {
-        self.height
+        self.size.height
     }
 
     /// Columns and rows \[px\].
-    pub fn size(&self) -> (usize, usize) {
-        (self.width, self.height)
+    pub fn size(&self) -> Size {
+        self.size
     }
 
     /// The grey values.
@@ -106,15 +107,17 @@ mod tests {
 
     #[test]
     fn a_frame_holds_exactly_its_pixels() {
-        let wrong = Frame::new(0, Stamp::START, (3, 2), Pixels::Grey8(vec![0; 5])).unwrap_err();
+        let wrong =
+            Frame::new(0, Stamp::START, Size::new(3, 2), Pixels::Grey8(vec![0; 5])).unwrap_err();
         assert_eq!(wrong.to_string(), "an image of 3x2 px needs 6 values, found 5");
-        assert!(Frame::new(0, Stamp::START, (0, 0), Pixels::Grey8(vec![])).is_err());
-        assert!(Frame::new(0, Stamp::START, (3, 2), Pixels::Grey16(vec![0; 6])).is_ok());
+        assert!(Frame::new(0, Stamp::START, Size::new(0, 0), Pixels::Grey8(vec![])).is_err());
+        assert!(Frame::new(0, Stamp::START, Size::new(3, 2), Pixels::Grey16(vec![0; 6])).is_ok());
     }
 
     #[test]
     fn sixteen_bits_show_as_eight() {
-        let frame = Frame::new(0, Stamp::START, (2, 1), Pixels::Grey16(vec![65535, 256])).unwrap();
+        let frame =
+            Frame::new(0, Stamp::START, Size::new(2, 1), Pixels::Grey16(vec![65535, 256])).unwrap();
         assert_eq!(frame.to_grey8().as_ref(), &[255, 1]);
     }
 }

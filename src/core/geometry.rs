@@ -8,6 +8,38 @@ pub type ImagePoint = Point2<f64>;
 /// A point on a surface parallel to the bed, in the bed's axes \[mm\].
 pub type SurfacePoint = Point2<f64>;
 
+/// Size of an image \[px\].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size {
+    /// Number of columns.
+    pub width: usize,
+    /// Number of rows.
+    pub height: usize,
+}
+
+impl Size {
+    /// So many columns and rows.
+    pub const fn new(width: usize, height: usize) -> Self {
+        Self { width, height }
+    }
+}
+
+/// Columns and rows of something that lies in a grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GridSize {
+    /// How many along a row.
+    pub columns: usize,
+    /// How many along a column.
+    pub rows: usize,
+}
+
+impl GridSize {
+    /// So many columns and rows.
+    pub const fn new(columns: usize, rows: usize) -> Self {
+        Self { columns, rows }
+    }
+}
+
 /// Region of interest: whole pixels of the image, `x..x + width` by
 /// `y..y + height`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,8 +56,9 @@ pub struct Roi {
 
 impl Roi {
     /// Whether every pixel of it lies in an image of this size.
-    pub fn fits(&self, (width, height): (usize, usize)) -> bool {
-        self.x.saturating_add(self.width) <= width && self.y.saturating_add(self.height) <= height
+    pub fn fits(&self, size: Size) -> bool {
+        self.x.saturating_add(self.width) <= size.width
+            && self.y.saturating_add(self.height) <= size.height
     }
 }
 

@@ -6,6 +6,7 @@
 //! that only answers.
 
 use super::fit::{Before, DeadTime, Fit, Note, Samples, Settings, Structure, fit};
+use crate::numeric::number::float;
 
 /// The output is looked for ahead by up to this share of the record…
 const LEAD_SHARE: f64 = 0.125;
@@ -107,8 +108,7 @@ fn brought_forward(samples: &Samples, settings: &Settings, lead_s: f64) -> Optio
     let dt_s = samples.dt_s();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
     let steps = (lead_s / dt_s).floor().max(0.0) as usize;
-    #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
-    let lead_s = steps as f64 * dt_s;
+    let lead_s = float(steps) * dt_s;
     let forward = cut(samples, steps, samples.len().checked_sub(steps)?)?;
     let range = DeadTime::Estimated { least_s: 0.0, most_s: 2.0 * lead_s.max(dt_s) };
     let fits = AHEAD.iter().filter_map(|form| tried(&forward, settings, *form, range));

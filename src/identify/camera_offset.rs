@@ -20,30 +20,27 @@
 
 mod course;
 mod data;
-mod profile;
-mod study;
+mod error;
+mod estimate;
+mod observation;
+mod offset_profile;
 mod whiten;
 
 #[cfg(test)]
 mod tests;
 
 use course::Course;
-use data::{Data, Look};
-use profile::Profile;
-pub use study::{Seen, Study};
+use data::Data;
+pub use error::{FEWEST, FEWEST_PIECES, OffsetError};
+pub use estimate::{EXPONENTS, Found, Seen, SpeedRange, Study};
+use observation::Look;
+use offset_profile::{NearlyAsGood, Profile};
 use whiten::Noise;
 
 use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
-use crate::core::units::{Mm, MmPerS};
+use crate::core::units::Mm;
 
-/// Exponents b that a bead may have. The bead of Shojaei Barjuei et al. 2022 has 0.22 to
-/// 0.27, one whose mass alone counts has 1.
-pub const EXPONENTS: (f64, f64) = (0.1, 2.0);
-/// Widths below which nothing is told.
-pub const FEWEST: usize = 50;
-/// Gauges of path, side by side, below which the noise is not told from the bead.
-pub const FEWEST_PIECES: usize = 10;
 /// Change of the speed below which no width shows it.
 const LEAST_CHANGE: f64 = 0.01;
 /// Part of a bead's speeds, at either end, that does not count as their range.
@@ -51,10 +48,9 @@ const TAIL: f64 = 0.02;
 /// Squares, in units of the noise, by which a speed that tells must lessen what is left:
 /// five standard deviations, because many offsets are tried.
 const LEAST_GAIN: f64 = 25.0;
-/// Another offset is as good if it is worse by no more than four standard deviations ...
-const AS_GOOD: f64 = 16.0;
-/// ... or explains this part of what the best one does.
-const AS_MUCH: f64 = 0.9;
+/// Another offset is as good if it is worse by no more than four standard deviations, or
+/// explains nine tenths of what the best one does.
+const NEARLY_AS_GOOD: NearlyAsGood = NearlyAsGood { worse: 16.0, explained: 0.9 };
 /// Those that explain this part of it are held against the best.
 const CANDIDATE: f64 = 0.4;
 /// Times that offset, exponent, noise and the widths that count are found anew.
@@ -83,123 +79,6 @@ pub struct Search {
     pub farthest: Mm,
 }
 
-/// An offset that was found.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found {
-    /// Path length from the nozzle back to the middle of the gauge.
-    pub offset: Mm,
-    /// Its standard deviation.
-    pub sigma: Mm,
-    /// Exponent b of the bead.
-    pub exponent: f64,
-    /// Whether the exponent is at an end of [`EXPONENTS`], beyond which none is tried.
-    pub at_bound: bool,
-    /// Slowest and fastest speed at which the bead was laid, the outermost 2 % left out.
-    pub speeds: (MmPerS, MmPerS),
-    /// Widths that told it.
-    pub used: usize,
-    /// Widths that did not: measured while no bead was laid, of bead whose speed is not
-    /// known or nearly none, or far off their neighbours.
-    pub left_out: usize,
-    /// What is left of the widths, as a share (root mean square).
-    pub scatter: f64,
-}
-
-/// Why a bead does not tell the offset.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum OffsetError {
-    /// Nothing says where the nozzle was.
-    #[error(
-        "no robot state with a path that grew in PRINT or HOLD: the offset shows only while bead \
-         is laid"
-    )]
-    NoPath,
-    /// Too few widths.
-    #[error(
-        "{found} widths are of bead that was laid while the speed is known, and {FEWEST} are needed: \
-         record longer, or see why frames were refused (`truebead process`)"
-    )]
-    TooFew {
-        /// Widths that could be used.
-        found: usize,
-    },
-    /// Too little path.
-    #[error(
-        "the widths cover only {pieces} gauges side by side, of {:.1} mm each, and {FEWEST_PIECES} are \
-         needed: record a longer bead", gauge.get()
-    )]
-    TooShort {
-        /// Length of the gauge.
-        gauge: Mm,
-        /// How many gauges of path were measured.
-        pieces: usize,
-    },
-    /// The speed hardly changed.
-    #[error(
-        "the speed changed by {:.1} % only ({:.1} to {:.1} mm/s), which shows in no width: run once \
-         with steps of the target width, or of the speed, by 20 % or more",
-        100.0 * (to.get() / from.get() - 1.0), from.get(), to.get()
-    )]
-    Steady {
-        /// Slowest speed.
-        from: MmPerS,
-        /// Fastest speed.
-        to: MmPerS,
-    },
-    /// The widths do not show it.
-    #[error(
-        "the speed changed by {:.1} % ({:.1} to {:.1} mm/s), but the widths do not follow it \
-         clearly, at no offset up to {farthest}: run once with larger or more abrupt steps of the \
-         target width or of the speed",
-        100.0 * (to.get() / from.get() - 1.0), from.get(), to.get()
-    )]
-    NotFollowing {
-        /// Slowest speed.
-        from: MmPerS,
-        /// Fastest speed.
-        to: MmPerS,
-        /// Largest offset that was tried.
-        farthest: Mm,
-    },
-    /// The best is at an end of what was tried.
-    #[error(
-        "the widths fit best at the end of what was tried, {at:.1} of 0 to {farthest}: give more with \
-         --max-mm if the camera is further away; otherwise the widths follow something else than \
-         the speed",
-        at = .at.get()
-    )]
-    AtEnd {
-        /// The best that was tried.
-        at: Mm,
-        /// Largest offset that was tried.
-        farthest: Mm,
-    },
-    /// Two offsets are as good.
-    #[error(
-        "{:.1} mm and {:.1} mm fit about as well, as with a speed that repeats itself: run once \
-         with steps at uneven distances, or give a --max-mm between the two",
-        first.get(), second.get()
-    )]
-    Ambiguous {
-        /// The best.
-        first: Mm,
-        /// Another one.
-        second: Mm,
-    },
-    /// Known no better than itself.
-    #[error(
-        "{:.1} ± {:.1} mm is no answer: run once with larger or more abrupt steps of the target \
-         width or of the speed",
-        offset.get(), sigma.get()
-    )]
-    Loose {
-        /// The best.
-        offset: Mm,
-        /// Its standard deviation.
-        sigma: Mm,
-    },
-}
-
 /// Finds the offset from what the robot reported, in order, and the widths that were
 /// measured meanwhile.
 pub fn find(
@@ -222,7 +101,7 @@ pub fn study(
         return Err(OffsetError::TooFew { found: looks.len() });
     }
     let speeds = course.range(TAIL);
-    let (from, to) = speeds;
+    let SpeedRange { min: from, max: to } = speeds;
     if to.get() < from.get() * (1.0 + LEAST_CHANGE) {
         return Err(OffsetError::Steady { from, to });
     }
@@ -268,7 +147,7 @@ struct Settled {
     used: Vec<Look>,
     noise: Noise,
     profile: Profile,
-    best: profile::Fit,
+    best: offset_profile::Fit,
 }
 
 /// Finds them in turn, each with what is known of the others.
@@ -276,7 +155,7 @@ fn settle(
     course: &Course,
     looks: &[Look],
     search: Search,
-    (from, to): (MmPerS, MmPerS),
+    speeds: SpeedRange,
 ) -> Result<Settled, OffsetError> {
     let mut noise = Noise::FIRST;
     let mut exponent = 0.5;
@@ -292,10 +171,11 @@ fn settle(
         }
         let best = profile.best(search.farthest.get());
         if profile.gain(&best) < LEAST_GAIN {
+            let SpeedRange { min: from, max: to } = speeds;
             return Err(OffsetError::NotFollowing { from, to, farthest: search.farthest });
         }
         let likeliest = profile.likeliest_noise(&best);
-        let next = profile::those_that_count(course, looks, search.gauge, &best, likeliest);
+        let next = offset_profile::those_that_count(course, looks, search.gauge, &best, likeliest);
         if next.len() < FEWEST {
             return Err(OffsetError::TooFew { found: next.len() });
         }
@@ -331,7 +211,7 @@ impl Settled {
             let data = Data::of(course, &shared, best.exponent, search.gauge);
             let profile = Profile::new(data, self.noise);
             let best = profile.near(best.offset_mm);
-            profile.as_good(&profile.near(rival), &best, (AS_GOOD, AS_MUCH))
+            profile.as_good(&profile.near(rival), &best, NEARLY_AS_GOOD)
         });
         rival.map_or(Ok(()), |second| {
             Err(OffsetError::Ambiguous { first: mm(best.offset_mm), second: mm(second) })

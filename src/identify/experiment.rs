@@ -7,12 +7,11 @@ mod suspicion;
 
 use std::fmt;
 
-pub use self::error::{ExperimentError, Side};
+pub use self::error::{ExperimentError, FEWEST_SAMPLES, Side};
 pub use self::suspicion::doubt_unit;
 use super::grid::{Gap, Grid, usual_step};
+use crate::numeric::number::float;
 
-/// Samples that a model takes at least.
-pub const FEWEST_SAMPLES: usize = 50;
 /// Usual steps between these can be of an extruder's log \[s\]; beyond them the
 /// unit of time is another.
 const STEPS_S: std::ops::RangeInclusive<f64> = 2e-5..=2.0;
@@ -161,9 +160,8 @@ impl Experiment {
             return Err(ExperimentError::TooFew { got: kept });
         }
         let (input, output) = (self.input.split_off(kept), self.output.split_off(kept));
-        #[expect(clippy::cast_precision_loss, reason = "counts of samples")]
         let [start_s, end_s] =
-            [kept, kept + left].map(|count| self.start_s + count as f64 * self.step_s);
+            [kept, kept + left].map(|count| self.start_s + float(count) * self.step_s);
         for (side, values, validates) in [
             (Side::Input, &self.input, false),
             (Side::Output, &self.output, false),

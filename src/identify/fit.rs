@@ -25,17 +25,23 @@
 //! `sigma` allows for the residuals' own colour (an autoregressive model of them
 //! between the two halves of the sandwich), `sigma_if_white` does not.
 
+mod autoregression;
+mod check;
 mod clipped;
 mod compare;
 mod detrended;
 mod drift;
 mod error;
+mod estimate;
+mod identifiability;
 mod levenberg;
+mod linear;
 mod loose;
 mod named;
 mod problem;
 mod quality;
 mod report;
+mod row;
 mod samples;
 mod settings;
 mod spread;
@@ -46,23 +52,20 @@ pub use clipped::{Clipped, Column, End};
 pub use compare::{Comparison, Row, compare};
 pub use detrended::SteadyGain;
 pub use error::FitError;
+pub use estimate::{Fit, Note, Parameter};
 pub use loose::Loose;
 pub use quality::Quality;
-pub use report::{Fit, Note, Parameter};
 pub use samples::{Samples, SamplesError};
-pub use settings::{Before, DeadTime, Level, Settings, Structure};
+pub use settings::{Before, DeadTime, Level, MOST_POLES, Settings, Structure};
 pub use trend::{DOMINATES, Trend};
 
 use crate::numeric::lti::Between;
 use problem::Problem;
 
-/// Most poles of a fit.
-pub const MOST_POLES: usize = 4;
-
 /// Fits one model. Fails where the data cannot tell one ([`SamplesError`]) and where
 /// the outcome is none ([`FitError`]); every message says what was found.
 pub fn fit(samples: &Samples, settings: &Settings) -> Result<Fit, FitError> {
-    settings.check(samples)?;
+    check::check(settings, samples)?;
     samples.check_input(settings.before)?;
     samples.check_clipped().map_err(SamplesError::from)?;
     let problem = Problem::new(samples, settings);

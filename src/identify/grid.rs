@@ -1,5 +1,8 @@
 //! From moments as they were logged to an even grid of samples.
 
+use crate::numeric::number::float;
+use crate::numeric::rank;
+
 /// A step beyond this many usual ones has lost samples.
 const GAP: f64 = 1.8;
 /// Moments may be off the grid by this share of a step, as those are that were
@@ -41,14 +44,14 @@ impl Grid {
         let usual = usual_step(time_s)?;
         let steps = || time_s.windows(2).map(|pair| pair[1] - pair[0]);
         let even: Vec<f64> = steps().filter(|step| *step <= GAP * usual).collect();
-        let step_s = even.iter().sum::<f64>() / as_f64(even.len().max(1));
+        let step_s = even.iter().sum::<f64>() / float(even.len().max(1));
         let gap = |(after, length_s): (usize, f64)| {
             let from_s = time_s.get(after).copied()?;
             (length_s > GAP * usual).then_some(Gap { after, from_s, length_s })
         };
         let gaps: Vec<Gap> = steps().enumerate().filter_map(gap).collect();
         let off =
-            |(k, time): (usize, &f64)| (time - first - as_f64(k) * step_s).abs() > ROUNDED * step_s;
+            |(k, time): (usize, &f64)| (time - first - float(k) * step_s).abs() > ROUNDED * step_s;
         let is_uneven = !gaps.is_empty() || time_s.iter().enumerate().any(off);
         let count = whole((last - first) / step_s + ROUNDED) + 1;
         Some(Self { start_s: first, step_s, count, is_uneven, gaps })
@@ -86,7 +89,7 @@ impl Grid {
     fn placed(&self, time_s: &[f64], value: impl Fn(usize, f64) -> f64) -> Vec<f64> {
         let mut before = 0;
         let mut at = |k: usize| {
-            let moment = self.start_s + as_f64(k) * self.step_s;
+            let moment = self.start_s + float(k) * self.step_s;
             while time_s.get(before + 1).is_some_and(|next| *next <= moment) {
                 before += 1;
             }
@@ -103,12 +106,7 @@ impl Grid {
 /// The median step.
 pub fn usual_step(time_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    crate::numeric::rank::median(&mut steps)
-}
-
-#[expect(clippy::cast_precision_loss, reason = "counts of samples")]
-fn as_f64(count: usize) -> f64 {
-    count as f64
+    rank::median(&mut steps)
 }
 
 #[expect(
@@ -127,7 +125,7 @@ mod tests {
     use super::*;
 
     fn times(rate_hz: f64, count: usize) -> Vec<f64> {
-        (0..count).map(|k| 3.0 + as_f64(k) / rate_hz).collect()
+        (0..count).map(|k| 3.0 + float(k) / rate_hz).collect()
     }
 
     #[test]
@@ -149,7 +147,7 @@ mod tests {
         assert!((gap.from_s - 3.5).abs() < 1e-9 && (gap.length_s - 0.04).abs() < 1e-9);
         assert!(gap.length_s < grid.usual_limit_s());
         for (k, value) in grid.linear(&time_s, &values).iter().enumerate() {
-            assert!((value - 5.0 * (3.0 + as_f64(k) * 0.01)).abs() < 1e-9, "{k}");
+            assert!((value - 5.0 * (3.0 + float(k) * 0.01)).abs() < 1e-9, "{k}");
         }
     }
 

@@ -1,5 +1,7 @@
 //! What a model leaves: whether it still hangs together.
 
+use crate::numeric::number::float;
+
 /// Of a normal variable 99 % lie within so many standard deviations.
 const NORMAL_99: f64 = 2.5758;
 
@@ -15,7 +17,7 @@ pub struct Autocorrelation {
 impl Autocorrelation {
     /// Up to a lag; of a row about its mean.
     pub fn of(row: &[f64], longest: usize) -> Self {
-        let n = as_f64(row.len().max(1));
+        let n = float(row.len().max(1));
         let mean = row.iter().sum::<f64>() / n;
         let off: Vec<f64> = row.iter().map(|value| value - mean).collect();
         let at = |lag: usize| -> f64 {
@@ -33,13 +35,8 @@ impl Autocorrelation {
     pub fn share_outside(&self) -> f64 {
         let lags = self.lags.get(1..).unwrap_or_default();
         let outside = lags.iter().filter(|lag| lag.abs() > self.bound).count();
-        as_f64(outside) / as_f64(lags.len().max(1))
+        float(outside) / float(lags.len().max(1))
     }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "counts of samples")]
-fn as_f64(count: usize) -> f64 {
-    count as f64
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat, ImageReader};
 
 use crate::core::frame::{Channel, Frame, Layout, Pixels, WrongSize};
+use crate::core::geometry::Size;
 use crate::core::time::Stamp;
 
 /// Endings of the file names that are taken for images, without the dot and in
@@ -119,7 +120,7 @@ pub fn decode(
     }
     let image = reader.decode().map_err(DecodeError::Broken)?;
     let size = (image.width() as usize, image.height() as usize);
-    Ok(Frame::new(seq, captured_at, size, grey_values(image, channel)?)?)
+    Ok(Frame::new(seq, captured_at, Size::new(size.0, size.1), grey_values(image, channel)?)?)
 }
 
 /// Whether a JPEG has no end after the beginning of its last scan. Its decoder
@@ -149,7 +150,7 @@ fn grey_values(image: DynamicImage, channel: Channel) -> Result<Pixels, DecodeEr
 /// A frame as the bytes of a PNG of its own depth, compressed fast rather than
 /// small.
 pub fn encode_png(frame: &Frame) -> Result<Vec<u8>, EncodeError> {
-    let (width, height) = frame.size();
+    let Size { width, height } = frame.size();
     let failed = |what: String| EncodeError { width, height, what };
     let side = |px: usize| u32::try_from(px).map_err(|_| failed("a side is too long".to_owned()));
     let (columns, rows) = (side(width)?, side(height)?);
@@ -189,7 +190,7 @@ mod tests {
             DynamicImage::ImageLuma16(ImageBuffer::from_raw(3, 2, deep.clone()).unwrap());
         for format in [ImageFormat::Png, ImageFormat::Tiff, ImageFormat::Pnm] {
             let frame = decoded(&bytes_of(&deep_image, format), Channel::Red);
-            assert_eq!((frame.size(), frame.seq, frame.captured_at.ns()), ((3, 2), 3, 9));
+            assert_eq!((frame.size(), frame.seq, frame.captured_at.ns()), (Size::new(3, 2), 3, 9));
             assert_eq!(frame.pixels(), &Pixels::Grey16(deep.clone()), "{format:?}");
         }
         let flat: Vec<u8> = vec![0, 1, 127, 128, 254, 255];
@@ -231,7 +232,7 @@ mod tests {
         for pixels in
             [Pixels::Grey8(vec![0, 7, 200, 255]), Pixels::Grey16(vec![0, 300, 4095, 65535])]
         {
-            let frame = Frame::new(3, Stamp::from_ns(9), (2, 2), pixels).unwrap();
+            let frame = Frame::new(3, Stamp::from_ns(9), Size::new(2, 2), pixels).unwrap();
             assert_eq!(decoded(&encode_png(&frame).unwrap(), Channel::Grey), frame);
         }
     }

@@ -14,6 +14,7 @@ use crate::calibration::next_view::NextView;
 use crate::calibration::quality;
 use crate::calibration::sighting::Looks;
 use crate::calibration::solve::Solution;
+use crate::core::geometry::GridSize;
 use drawing::{Drawing, residuals, width_map};
 
 /// Everything that the page is made of.
@@ -57,7 +58,7 @@ impl Page<'_> {
     }
 
     fn about(&self) -> Markup {
-        let (columns, rows) = self.board.corners();
+        let GridSize { columns, rows } = self.board.corners();
         let [width, height] = self.solution.image_size_px;
         let model = self.solution.free.lens.map_or("none", |lens| lens.name());
         let kind = if self.board.is_plain() { "board" } else { "ChArUco board" };

@@ -46,7 +46,7 @@ impl Snapshot {
         edges: Option<Edges<'_>>,
         outcome: Result<WidthMeasurement, &'static str>,
     ) -> Self {
-        let corner_and_size = surroundings(gauge.roi, frame.size());
+        let corner_and_size = surroundings(gauge.roi, (frame.width(), frame.height()));
         let (cut, scale) = cut_out(frame, corner_and_size);
         let points = |side: fn(Edges<'_>) -> &[ImagePoint]| {
             edges.map(|edges| side(edges).to_vec()).unwrap_or_default()

@@ -59,6 +59,7 @@ fn name(frame: u64, outcome: Result<WidthMeasurement, &'static str>) -> String {
 mod tests {
     use super::*;
     use crate::core::frame::Pixels;
+    use crate::core::geometry::Size;
     use crate::core::time::Stamp;
     use crate::report::synthetic;
     use crate::vision::Reject;
@@ -68,7 +69,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let writer = OverlayWriter::create(folder.path(), synthetic::gauge()).unwrap();
         let pixels = Pixels::Grey8(vec![40; 720 * 540]);
-        let frame = Frame::new(7, Stamp::START, (720, 540), pixels).unwrap();
+        let frame = Frame::new(7, Stamp::START, Size::new(720, 540), pixels).unwrap();
         let none = Edges { left: &[], right: &[] };
         writer.frame(&frame, none, Err(Reject::OffSurface.status())).unwrap();
         let file = folder.path().join("overlays/000007_off_surface.png");

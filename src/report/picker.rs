@@ -157,7 +157,7 @@ fn draw(kept: &Kept) -> Option<Chosen> {
 mod tests {
     use super::*;
     use crate::core::frame::Pixels;
-    use crate::core::geometry::Roi;
+    use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
     use crate::core::units::Mm;
     use crate::rows::frame_row::sample;
@@ -177,7 +177,8 @@ mod tests {
 
     fn offer(picker: &mut FramePicker, seq: u64, outcome: Result<f64, &'static str>) {
         let frame =
-            Frame::new(seq, Stamp::START, (32, 24), Pixels::Grey8(vec![90; 32 * 24])).unwrap();
+            Frame::new(seq, Stamp::START, Size::new(32, 24), Pixels::Grey8(vec![90; 32 * 24]))
+                .unwrap();
         let row = FrameRow {
             frame: seq,
             time_s: None,

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use pdf_writer::{Content, Name, Pdf, Rect, Ref, Str};
 
 use crate::calibration::board::Board;
+use crate::core::geometry::GridSize;
 
 /// Points of a PDF in a millimetre.
 const POINTS: f64 = 72.0 / 25.4;
@@ -71,7 +72,7 @@ impl Sheet {
     /// Lays a board out in the middle of the paper, with a bar to check its size with.
     #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
     pub fn of(board: &Board, paper: Paper) -> Result<Self, TooLarge> {
-        let (columns, rows) = board.corners();
+        let GridSize { columns, rows } = board.corners();
         let side = board.square().get();
         let (width, height) = ((columns + 1) as f64 * side, (rows + 1) as f64 * side);
         let need_mm = width.max(BAR_MM[1]) + 2.0 * MARGIN_MM;
@@ -193,7 +194,7 @@ impl Sheet {
 #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
 fn markers(board: &Board, (left, top): (f64, f64)) -> Vec<[f64; 4]> {
     let Some(marks) = board.marks() else { return Vec::new() };
-    let (columns, rows) = board.corners();
+    let GridSize { columns, rows } = board.corners();
     let square = board.square().get();
     let cell = marks.side.get() / (marks.dictionary.side() + 2) as f64;
     let mut black: Vec<[f64; 4]> = Vec::new();

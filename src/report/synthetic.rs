@@ -13,7 +13,7 @@ use std::path::Path;
 use crate::control::event::Event;
 use crate::control::step::{Command, Fault, Hold, State, Step, Trace};
 use crate::core::frame::{Frame, Pixels};
-use crate::core::geometry::{ImagePoint, Roi};
+use crate::core::geometry::{ImagePoint, Roi, Size};
 use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, MmPerS, MmPerS2};
@@ -127,7 +127,7 @@ fn picture(frame: u64, width_px: f64, edges: &mut [Vec<ImagePoint>; 2]) -> Frame
             ImagePoint::new(wave(y, side), y)
         }));
     }
-    Frame::new(frame, Stamp::START, SIZE, Pixels::Grey8(pixels)).unwrap()
+    Frame::new(frame, Stamp::START, Size::new(SIZE.0, SIZE.1), Pixels::Grey8(pixels)).unwrap()
 }
 
 fn measured(frame: u64, width: f64) -> WidthMeasurement {

@@ -6,6 +6,7 @@ mod text;
 
 use crate::cell::Cell;
 use crate::cell::file::RunPart;
+use crate::identify::camera_offset::SpeedRange;
 use crate::sim::cell::SimError;
 use crate::tune::candidate::Candidate;
 use crate::tune::noise::Drift;
@@ -164,7 +165,7 @@ impl Tuned {
 
     fn robot_warning(&self) -> Option<String> {
         let robot = self.plant.robot.ok()?;
-        let (from, to) = self.plant.study.found.speeds;
+        let SpeedRange { min: from, max: to } = self.plant.study.found.speeds;
         (robot.left_mm_per_s > UNLIKE * (to - from).get()).then(|| {
             format!(
                 "the robot answers otherwise than by a dead time, a lag and a largest slope: {:.1} \

@@ -6,7 +6,7 @@ use super::hash;
 use crate::calibration::Camera;
 use crate::calibration::board::Board;
 use crate::core::frame::{Frame, Pixels, WrongSize};
-use crate::core::geometry::Pose;
+use crate::core::geometry::{GridSize, Pose, Size};
 use crate::core::time::Stamp;
 use crate::numeric::normal_distribution;
 
@@ -84,7 +84,12 @@ impl BoardStudio {
             let pair = hash::normal_pair(hash::mix(&[seed, i as u64 / 2]));
             rounded(grey + exposure.noise_grey * pair[i % 2])
         });
-        Frame::new(0, Stamp::START, self.size, Pixels::Grey8(values.collect()))
+        Frame::new(
+            0,
+            Stamp::START,
+            Size::new(self.size.0, self.size.1),
+            Pixels::Grey8(values.collect()),
+        )
     }
 }
 
@@ -124,7 +129,7 @@ impl Marked {
     #[expect(clippy::cast_precision_loss, reason = "a handful of cells")]
     fn of(board: &Board) -> Option<Self> {
         let count = board.marks()?.dictionary.side() + 2;
-        let (columns, rows) = board.corners();
+        let GridSize { columns, rows } = board.corners();
         let squares =
             (0..(columns + 1) * (rows + 1)).map(|i| (i % (columns + 1), i / (columns + 1)));
         let clear = board.clear();
@@ -162,7 +167,7 @@ impl Scene {
             axes.column(1) * side,
             pose.translation_mm(),
         ]);
-        let (columns, rows) = board.corners();
+        let GridSize { columns, rows } = board.corners();
         Self {
             to_board: from_board.try_inverse().unwrap_or_else(Matrix3::zeros),
             squares: Vector2::new(columns as f64 + 1.0, rows as f64 + 1.0),

@@ -15,7 +15,7 @@ use super::view::{GaugeExtent, View};
 use super::{grains, hash, motion, spots, texture};
 use crate::calibration::Calibration;
 use crate::core::frame::{Frame, Pixels, WrongSize};
-use crate::core::geometry::ImagePoint;
+use crate::core::geometry::{ImagePoint, Size};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::numeric::number::float;
@@ -100,7 +100,7 @@ impl Renderer {
         let side = |px: u32| usize::try_from(px).unwrap_or(usize::MAX);
         let size_px = calibration.image_size_px().unwrap_or(picture.size_px);
         let size = (side(size_px[0]), side(size_px[1]));
-        if !gauge.roi.fits(size) {
+        if !gauge.roi.fits(Size::new(size.0, size.1)) {
             let roi = gauge.roi;
             let reaches = (roi.x.saturating_add(roi.width), roi.y.saturating_add(roi.height));
             return Err(RenderError::GaugeOutside { reaches, picture: size });
@@ -139,7 +139,12 @@ impl Renderer {
         let seen = outline.as_ref().map(|outline| self.see(seq, outline, &view));
         let pixels = self.expose(seq, seen.as_ref());
         let truth = outline.and_then(|outline| truth::of(&outline, &view, &self.gauge));
-        let frame = Frame::new(seq, captured_at, self.size, Pixels::Grey8(pixels))?;
+        let frame = Frame::new(
+            seq,
+            captured_at,
+            Size::new(self.size.0, self.size.1),
+            Pixels::Grey8(pixels),
+        )?;
         Ok(Rendered { frame, truth })
     }
 

@@ -409,7 +409,7 @@ fn solve(rows: &[Row], limit: f64) -> Option<Line> {
 mod tests {
     use super::*;
     use crate::core::frame::{Frame, Pixels};
-    use crate::core::geometry::Roi;
+    use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
     use crate::vision::gauge::Axis;
     use crate::vision::strip::{Strips, Turner, View};
@@ -447,7 +447,8 @@ mod tests {
             (level * 257.0).round() as u16
         };
         let values = (0..40).flat_map(|_| (0..120u16).map(shown)).collect();
-        let frame = Frame::new(0, Stamp::START, SIZE, Pixels::Grey16(values)).unwrap();
+        let frame =
+            Frame::new(0, Stamp::START, Size::new(SIZE.0, SIZE.1), Pixels::Grey16(values)).unwrap();
         let view = View::new(Roi { x: 0, y: 0, width: 120, height: 40 }, Axis::Vertical);
         let mut turner = Turner::default();
         let Strips::Words(strip) = turner.strips(&frame, &view, None) else { unreachable!() };

@@ -212,7 +212,7 @@ fn polarity_fits(
 mod tests {
     use super::*;
     use crate::core::frame::Pixels;
-    use crate::core::geometry::Roi;
+    use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
     use crate::vision::Method;
 
@@ -222,7 +222,7 @@ mod tests {
                 (0..160usize).map(move |x| if (from..to).contains(&x) { 150 } else { 60 })
             })
             .collect();
-        Frame::new(0, Stamp::START, (160, 100), Pixels::Grey8(values)).unwrap()
+        Frame::new(0, Stamp::START, Size::new(160, 100), Pixels::Grey8(values)).unwrap()
     }
 
     fn gauge() -> Gauge {

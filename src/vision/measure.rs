@@ -237,9 +237,9 @@ impl Measurer {
         work.left_px.clear();
         work.right_px.clear();
         if !self.gauge.roi.fits(frame.size()) {
-            return Err(Reject::WrongSize { image: frame.size() });
+            return Err(Reject::WrongSize { image: (frame.width(), frame.height()) });
         }
-        check_size(frame.size(), surface)?;
+        check_size((frame.width(), frame.height()), surface)?;
         if self.gauge.method == Method::EdgeLines {
             let points = (&mut work.left_px, &mut work.right_px);
             return edge_lines::measure(&self.gauge, frame, surface, points);

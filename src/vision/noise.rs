@@ -107,7 +107,7 @@ fn count_below(differences: &[u16; ROWS * RUN], limit: u16) -> usize {
 mod tests {
     use super::*;
     use crate::core::frame::{Frame, Pixels};
-    use crate::core::geometry::Roi;
+    use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
     use crate::vision::gauge::Axis;
     use crate::vision::strip::{Strips, Turner, View};
@@ -132,7 +132,8 @@ mod tests {
                     grey.round().clamp(0.0, 255.0) as u8
                 })
                 .collect();
-            let frame = Frame::new(0, Stamp::START, (300, 200), Pixels::Grey8(values)).unwrap();
+            let frame =
+                Frame::new(0, Stamp::START, Size::new(300, 200), Pixels::Grey8(values)).unwrap();
             let view = View::new(Roi { x: 0, y: 0, width: 300, height: 200 }, Axis::Vertical);
             let mut turner = Turner::default();
             let Strips::Bytes(strip) = turner.strips(&frame, &view, None) else { unreachable!() };

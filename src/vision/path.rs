@@ -295,7 +295,7 @@ mod tests {
         let frame = crate::core::frame::Frame::new(
             0,
             crate::core::time::Stamp::START,
-            (20, 43),
+            crate::core::geometry::Size::new(20, 43),
             crate::core::frame::Pixels::Grey8(vec![0; 860]),
         );
         let frame = frame.unwrap();

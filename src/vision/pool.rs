@@ -146,7 +146,7 @@ fn count_full<T: Grey>(row: &[T], white: T) -> usize {
 mod tests {
     use super::*;
     use crate::core::frame::{Frame, Pixels};
-    use crate::core::geometry::Roi;
+    use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
     use crate::vision::gauge::Axis;
     use crate::vision::strip::{Strips, Turner, View};
@@ -156,7 +156,7 @@ mod tests {
     #[test]
     fn a_band_is_the_mean_of_rows_spread_about_its_middle() {
         let values = (0..20u8).flat_map(|y| (0..30u8).map(move |x| x * 4 + y)).collect();
-        let frame = Frame::new(0, Stamp::START, (30, 20), Pixels::Grey8(values)).unwrap();
+        let frame = Frame::new(0, Stamp::START, Size::new(30, 20), Pixels::Grey8(values)).unwrap();
         let mut turner = Turner::default();
         let view = View::new(ROI, Axis::Vertical);
         let Strips::Bytes(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn sixteen_bits_pool_to_the_same_scale_and_full_pixels_are_counted() {
         let values = (0..600u16).map(|k| if k < 360 { 4095 } else { 0 }).collect();
-        let frame = Frame::new(0, Stamp::START, (30, 20), Pixels::Grey16(values)).unwrap();
+        let frame = Frame::new(0, Stamp::START, Size::new(30, 20), Pixels::Grey16(values)).unwrap();
         let mut turner = Turner::default();
         let view = View::new(Roi { x: 0, y: 0, width: 30, height: 20 }, Axis::Vertical);
         let Strips::Words(strip) = turner.strips(&frame, &view, Some(4095)) else { unreachable!() };

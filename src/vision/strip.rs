@@ -315,11 +315,12 @@ fn transposed<T: Grey>(mut tile: [[T; TILE]; TILE]) -> [[T; TILE]; TILE] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::core::geometry::Size;
     use crate::core::time::Stamp;
 
     fn ramp() -> Frame {
         let values = (0..20u8).flat_map(|y| (0..30u8).map(move |x| x * 4 + y)).collect();
-        Frame::new(0, Stamp::START, (30, 20), Pixels::Grey8(values)).unwrap()
+        Frame::new(0, Stamp::START, Size::new(30, 20), Pixels::Grey8(values)).unwrap()
     }
 
     const ROI: Roi = Roi { x: 5, y: 4, width: 21, height: 16 };

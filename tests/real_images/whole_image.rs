@@ -2,9 +2,9 @@
 //! width is `ok` with a standard deviation beyond the gauge's limit.
 
 use std::path::{Path, PathBuf};
+use truebead::core::geometry::{Roi, Size};
 
 use truebead::core::frame::Frame;
-use truebead::core::geometry::Roi;
 use truebead::core::units::Mm;
 use truebead::io::image_file::has_image_extension;
 use truebead::vision::{Axis, Gauge, Polarity};
@@ -34,7 +34,7 @@ fn frames(name: &str) -> Option<Vec<Frame>> {
 }
 
 fn gauge(frame: &Frame, axis: Axis, polarity: Polarity) -> Gauge {
-    let (width, height) = frame.size();
+    let Size { width, height } = frame.size();
     let range = (Mm::constant(2.0), Mm::constant(600.0));
     Gauge::new(Roi { x: 0, y: 0, width, height }, axis, polarity, range)
 }

@@ -1,8 +1,8 @@
 //! OpenCV's `FileStorage` as YAML, with the keys of its calibration sample, or
 //! those that people give to the same matrices.
 
-use super::Intrinsics;
 use super::fields::{Fields, Names};
+use super::intrinsics::Intrinsics;
 use super::write::{number, row};
 use crate::calibration::camera::COEFFICIENTS;
 use crate::calibration::file::RMS_PX;
@@ -31,7 +31,7 @@ pub(super) fn read(fields: &Fields<'_>, notes: &mut Vec<String>) -> Option<Intri
                 .to_owned(),
         );
     }
-    let camera = fields.camera((matrix, distortion), &[4, 5, COEFFICIENTS, 12, 14], size);
+    let camera = fields.camera(matrix, distortion, &[4, 5, COEFFICIENTS, 12, 14], size);
     let rms_px = fields.optional_number(RMS, "avg_reprojection_error", RMS_PX);
     Some(Intrinsics { image_size_px: size?, camera: camera?, rms_px, camera_name: None })
 }

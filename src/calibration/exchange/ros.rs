@@ -2,8 +2,8 @@
 //! `camera_info_manager` reads, and `sensor_msgs/CameraInfo` as `ros2 topic echo`
 //! prints it.
 
-use super::Intrinsics;
 use super::fields::{Fields, Matrix, Names};
+use super::intrinsics::Intrinsics;
 use super::write::row;
 use crate::calibration::camera::COEFFICIENTS;
 
@@ -35,7 +35,7 @@ pub(super) fn read(fields: &Fields<'_>, notes: &mut Vec<String>) -> Option<Intri
     check_whole_picture(fields, [width, height]);
     note_rectification(fields, matrix.as_ref(), notes);
     let size = width.zip(height).map(|(width, height)| [width, height]);
-    let camera = fields.camera((matrix, distortion), counts.unwrap_or(&[4, 5, 8]), size);
+    let camera = fields.camera(matrix, distortion, counts.unwrap_or(&[4, 5, 8]), size);
     counts?;
     Some(Intrinsics {
         image_size_px: size?,

@@ -7,7 +7,7 @@ use crate::calibration::sighting;
 use crate::calibration::sighting::Sighting;
 use crate::calibration::{Camera, Quality};
 use crate::core::frame::{Frame, Pixels};
-use crate::core::geometry::Pose;
+use crate::core::geometry::{Pose, Size};
 use crate::core::time::Stamp;
 use crate::sim::boards::{BoardStudio, Exposure};
 use crate::sim::hash;
@@ -140,7 +140,8 @@ fn a_board_with_markers_has_one_reading_and_may_be_covered_in_part() {
         let px = ImagePoint::new((i % 640) as f64, (i / 640) as f64);
         if (px - nozzle).norm() < 45.0 { 70 } else { grey }
     });
-    let covered = Frame::new(0, Stamp::START, (640, 480), Pixels::Grey8(values.collect())).unwrap();
+    let covered =
+        Frame::new(0, Stamp::START, Size::new(640, 480), Pixels::Grey8(values.collect())).unwrap();
     let corners = sighting::look(&marked, "", &covered).unwrap().corners;
     assert!((30..54).contains(&corners.len()), "{}", corners.len());
     let touch = Touch { at, ..touch(0.0) };

@@ -5,7 +5,7 @@ use crate::calibration::dictionary::Dictionary;
 use crate::calibration::synthetic;
 use crate::calibration::synthetic::poses;
 use crate::core::frame::Pixels;
-use crate::core::geometry::Pose;
+use crate::core::geometry::{GridSize, Pose, Size};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::sim::boards::{BoardStudio, Exposure};
@@ -19,7 +19,7 @@ fn board(columns: usize, rows: usize) -> Board {
 fn seen(shown: &Board, exposure: Exposure) -> Result<Sighting, Refusal> {
     let camera =
         Camera::pinhole([620.0, 622.0], [263.0, 198.0]).with_five([-0.2, 0.05, 0.0, 0.0, 0.0]);
-    let (columns, rows) = shown.corners();
+    let GridSize { columns, rows } = shown.corners();
     #[expect(clippy::cast_precision_loss, reason = "a handful of corners")]
     let middle = Vector3::new(columns as f64 - 1.0, rows as f64 - 1.0, 0.0) * 10.0;
     let pose = Pose::new(Vector3::new(0.2, -0.15, 0.05), Vector3::new(0.0, 0.0, 420.0) - middle);
@@ -46,13 +46,18 @@ fn other_boards_are_told_from_none() {
     assert!(said.contains("not one with 9x6"), "{said}");
     let larger = seen(&board(11, 8), Exposure::SHARP).unwrap_err();
     assert!(
-        matches!(larger, Refusal::Larger { .. } | Refusal::OtherBoard { found: (11, 8), .. }),
+        matches!(
+            larger,
+            Refusal::Larger { .. }
+                | Refusal::OtherBoard { found: GridSize { columns: 11, rows: 8 }, .. }
+        ),
         "{larger}"
     );
     let longer = seen(&board(10, 6), Exposure::SHARP).unwrap_err();
     assert!(matches!(longer, Refusal::Larger { .. } | Refusal::OtherBoard { .. }), "{longer}");
     let empty =
-        Frame::new(0, Stamp::START, (400, 300), Pixels::Grey8(vec![90; 400 * 300])).unwrap();
+        Frame::new(0, Stamp::START, Size::new(400, 300), Pixels::Grey8(vec![90; 400 * 300]))
+            .unwrap();
     let none = look(&board(9, 6), "a.png", &empty).unwrap_err();
     assert_eq!(none, Refusal::NoBoard { columns: 9, rows: 6 });
 }
@@ -66,7 +71,7 @@ fn at_the_edge(shown: &Board, behind: impl Fn(f64, f64) -> Option<u8>) -> Frame 
     let pose = Pose::from_parts(rotation, Vector3::new(-160.0, -116.0, 420.0));
     let frame = BoardStudio::new(&camera, [520, 400]).take(shown, &pose, Exposure::SHARP, 3);
     let frame = frame.unwrap();
-    let (width, _) = frame.size();
+    let width = frame.width();
     let mut values = frame.to_grey8().into_owned();
     for (i, value) in values.iter_mut().enumerate() {
         let px = Vector2::new(i % width, i / width).map(|at| f64::from(u16::try_from(at).unwrap()));
@@ -122,7 +127,7 @@ fn marked(columns: usize, rows: usize, dictionary: Dictionary) -> Board {
 fn picture(shown: &Board, at: Vector3<f64>, seed: u64) -> (Frame, Vec<Option<ImagePoint>>) {
     let camera =
         Camera::pinhole([900.0, 902.0], [323.0, 238.0]).with_five([-0.25, 0.05, 1e-3, -5e-4, 0.0]);
-    let (columns, rows) = shown.corners();
+    let GridSize { columns, rows } = shown.corners();
     #[expect(clippy::cast_precision_loss, reason = "a handful of corners")]
     let middle = Vector3::new(columns as f64 - 1.0, rows as f64 - 1.0, 0.0) * 10.0;
     let pose = Pose::new(Vector3::new(0.25, -0.2, 0.3), Vector3::zeros());
@@ -173,7 +178,7 @@ fn a_board_that_is_partly_in_the_picture_is_seen_as_far_as_it_is() {
 }
 
 fn mirrored(frame: &Frame) -> Frame {
-    let (width, _) = frame.size();
+    let width = frame.width();
     let rows = frame.to_grey8();
     let turned = rows.chunks(width).flat_map(|row| row.iter().rev().copied()).collect();
     Frame::new(0, Stamp::START, frame.size(), Pixels::Grey8(turned)).unwrap()
@@ -201,7 +206,8 @@ fn what_is_wrong_with_a_board_with_markers_is_told() {
     assert!(plain.contains("if it is a plain one leave out --marker-mm"), "{plain}");
     let with = said(&board(9, 6), &frame);
     assert!(with.contains("give --marker-mm"), "{with}");
-    let none = Frame::new(0, Stamp::START, (400, 300), Pixels::Grey8(vec![90; 120_000])).unwrap();
+    let none =
+        Frame::new(0, Stamp::START, Size::new(400, 300), Pixels::Grey8(vec![90; 120_000])).unwrap();
     assert_eq!(said(&shown, &none), "no board with markers of 4x4 cells: 0 of them show");
 }
 

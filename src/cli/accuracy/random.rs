@@ -14,6 +14,7 @@ use super::AccuracyArgs;
 use crate::calibration::SurfaceMap;
 use crate::cli::{Voice, WrongArguments};
 use crate::core::frame::Pixels;
+use crate::core::geometry::Size;
 use crate::io::progress::Progress;
 use crate::rows::output;
 use crate::studies::accuracy::drawn;
@@ -132,7 +133,7 @@ fn keep(set: &DrawnSet, numbers: Range<u64>, folder: &Path) -> Result<()> {
 }
 
 fn png(drawn: &DrawnFrame) -> Result<Vec<u8>> {
-    let (width, height) = drawn.frame.size();
+    let Size { width, height } = drawn.frame.size();
     let Pixels::Grey8(pixels) = drawn.frame.pixels() else { return Ok(Vec::new()) };
     let image = GrayImage::from_raw(u32::try_from(width)?, u32::try_from(height)?, pixels.clone())
         .context("a drawn frame")?;

@@ -18,6 +18,7 @@ use crate::calibration::sighting::Sighting;
 use crate::calibration::solve;
 use crate::calibration::solve::Solution;
 use crate::calibration::{Calibration, Quality, file};
+use crate::core::geometry::GridSize;
 use crate::core::units::Mm;
 use crate::io::whole_file::write_whole;
 use crate::report::calibration::Page;
@@ -84,7 +85,7 @@ impl<'a> Conclusion<'a> {
             return Ok(());
         };
         self.maps = heights.iter().map(|&height| WidthMap::of(known, bead, height)).collect();
-        self.next = next_view::best(self.board, &self.solution, known, (bead, heights));
+        self.next = next_view::best(self.board, &self.solution, known, bead, heights);
         Ok(())
     }
 
@@ -161,7 +162,7 @@ impl<'a> Conclusion<'a> {
     /// The text of the calibration file.
     fn file(&self) -> String {
         let (solution, plane) = (&self.solution, &self.plane);
-        let (columns, rows) = self.board.corners();
+        let GridSize { columns, rows } = self.board.corners();
         let kind = if self.board.is_plain() { "board" } else { "ChArUco board" };
         let note = format!(
             "From {} images of a {kind} with {columns}x{rows} inner corners and squares of {}.\n\
@@ -183,8 +184,8 @@ impl<'a> Conclusion<'a> {
             heights_mm: covariance.and_then(|_| solution.heights_mm(self.board, &bed)),
             uncertainty: covariance.map(Covariance::uncertainty),
         };
-        let model = (solution.camera(), &bed);
-        file::to_toml(model, solution.image_size_px, plane.robot_z, Some(quality), &[note])
+        let camera = solution.camera();
+        file::to_toml(camera, &bed, solution.image_size_px, plane.robot_z, Some(quality), &[note])
     }
 }
 

@@ -7,7 +7,7 @@ use nalgebra::Vector2;
 
 use crate::assembly::LoadedCell;
 use crate::calibration::Calibration;
-use crate::calibration::map::CELLS;
+use crate::calibration::map::{CELLS, Cells};
 use crate::calibration::share_map::{Bead, ShareMap, share_at};
 use crate::core::geometry::{ImagePoint, Roi};
 use crate::io::whole_file::write_whole;
@@ -15,7 +15,7 @@ use crate::report::calibration::cell::CellPage;
 use crate::vision::gauge::Axis;
 
 /// Cells of the map in text, along the image and across it.
-const TEXT_CELLS: (u32, u32) = (8, 6);
+const TEXT_CELLS: Cells = Cells { columns: 8, rows: 6 };
 
 /// Prints it, and writes the page where one is asked for. Says so where the calibration
 /// has no more than one number for the whole image, or none.
@@ -89,7 +89,7 @@ fn middle(roi: Roi) -> ImagePoint {
 
 /// The map with the columns and rows of the cells' middles \[px\].
 fn lines(map: &ShareMap, gauge: Roi) -> Vec<String> {
-    let (columns, rows) = map.counts;
+    let Cells { columns, rows } = map.counts;
     let middle = |cell: u32| {
         let [left, top, right, bottom] = map.cell_px(cell);
         (f64::midpoint(left, right), f64::midpoint(top, bottom))

@@ -69,7 +69,7 @@ pub fn text(
         plane.images.join(", "),
     );
     let bed = plane.on_bed.bed(plane.thickness);
-    let text = file::to_toml((camera, &bed), *image_size_px, plane.robot_z, Some(quality), &[from]);
+    let text = file::to_toml(camera, &bed, *image_size_px, plane.robot_z, Some(quality), &[from]);
     file::parse(&args.out.display().to_string(), &text)
         .context("with this camera nothing can be measured; nothing was written")?;
     Ok(text)

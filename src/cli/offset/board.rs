@@ -9,6 +9,7 @@ use super::{OffsetArgs, tell};
 use crate::assembly::LoadedCell;
 use crate::calibration::offset::{Found, Gauge, OffsetError, Touch, find};
 use crate::cell::file::{Mount, Purpose};
+use crate::core::geometry::GridSize;
 use crate::core::units::Mm;
 use crate::sim::view::gauge_middle;
 use crate::vision::Axis;
@@ -47,7 +48,7 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
         return Err(WrongArguments::new(what).into());
     };
     let board = board.board()?;
-    let (columns, rows) = board.corners();
+    let GridSize { columns, rows } = board.corners();
     for (at, count) in at.into_iter().zip([columns, rows]) {
         #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
         let (from, to) = (-1.0 - BEYOND, count as f64 + BEYOND);

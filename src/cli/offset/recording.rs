@@ -12,6 +12,7 @@ use crate::cell::file::Purpose;
 use crate::core::robot::RobotState;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
+use crate::identify::camera_offset::SpeedRange;
 use crate::identify::camera_offset::{EXPONENTS, Found, Search, find};
 use crate::io::recording::Recording;
 use crate::numeric::rank;
@@ -79,7 +80,7 @@ pub fn gauge(
 }
 
 fn answer(found: &Found, print: &Print, gauge: Mm, now: Option<Mm>) {
-    let (from, to) = found.speeds;
+    let SpeedRange { min: from, max: to } = found.speeds;
     let (offset, sigma) = (found.offset.get(), found.sigma.get());
     say!("offset     {offset:.2} ± {sigma:.2} mm from the nozzle to the middle of the gauge");
     let bound = if found.at_bound {

@@ -163,13 +163,15 @@ fn frame_number(text: &str, files: &[PathBuf]) -> Option<u64> {
 mod tests {
     use super::*;
     use crate::core::frame::{Frame, Pixels};
+    use crate::core::geometry::Size;
     use crate::core::time::Stamp;
 
     fn folder_of(names: &[&str]) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         for (i, name) in names.iter().enumerate() {
             let values = vec![u8::try_from(i).unwrap(); 6];
-            let frame = Frame::new(0, Stamp::START, (3, 2), Pixels::Grey8(values)).unwrap();
+            let frame =
+                Frame::new(0, Stamp::START, Size::new(3, 2), Pixels::Grey8(values)).unwrap();
             fs::write(folder.path().join(name), image_file::encode_png(&frame).unwrap()).unwrap();
         }
         folder

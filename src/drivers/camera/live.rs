@@ -200,6 +200,7 @@ mod tests {
     use super::worker::put;
     use super::*;
     use crate::core::frame::Pixels;
+    use crate::core::geometry::Size;
     use crossbeam_channel::{Receiver, Sender, bounded};
     use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -209,7 +210,7 @@ mod tests {
     impl Capture for Scripted {
         fn capture(&mut self) -> Result<Frame, String> {
             let at = self.0.recv().map_err(|_| "unplugged".to_owned())??;
-            Ok(Frame::new(0, Stamp::from_ns(at), (1, 1), Pixels::Grey8(vec![0])).unwrap())
+            Ok(Frame::new(0, Stamp::from_ns(at), Size::new(1, 1), Pixels::Grey8(vec![0])).unwrap())
         }
     }
 
@@ -245,7 +246,7 @@ mod tests {
         let (slot, news) = bounded(1);
         for at in 1..=3 {
             let pixels = Pixels::Grey8(vec![0]);
-            let frame = Frame::new(0, Stamp::from_ns(at), (1, 1), pixels).unwrap();
+            let frame = Frame::new(0, Stamp::from_ns(at), Size::new(1, 1), pixels).unwrap();
             put(&slot, &news, News::Frame(frame));
         }
         assert!(matches!(news.try_recv(), Ok(News::Frame(f)) if f.captured_at.ns() == 3));

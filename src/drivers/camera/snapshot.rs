@@ -131,6 +131,7 @@ impl FrameSource for Snapshot {
 mod tests {
     use super::*;
     use crate::core::frame::{Frame, Pixels};
+    use crate::core::geometry::Size;
     use std::io::{Read, Write};
     use std::net::TcpListener;
     use std::thread;
@@ -167,7 +168,8 @@ mod tests {
     #[test]
     fn pictures_come_through_and_a_bad_one_is_a_row() {
         let frame =
-            Frame::new(0, Stamp::START, (2, 2), Pixels::Grey16(vec![1, 2, 3, 4000])).unwrap();
+            Frame::new(0, Stamp::START, Size::new(2, 2), Pixels::Grey16(vec![1, 2, 3, 4000]))
+                .unwrap();
         let png = image_file::encode_png(&frame).unwrap();
         let busy = b"HTTP/1.1 503 Busy\r\nConnection: close\r\nContent-Length: 0\r\n\r\n".to_vec();
         let mut source = open(&camera(vec![ok(&png), ok(b"<html>"), busy, ok(&png)])).unwrap();

@@ -97,6 +97,7 @@ impl FrameSource for VideoFile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::core::geometry::Size;
     use std::fs;
 
     /// Uncompressed AVI of grey pictures of 16x8 px, with as many frames as
@@ -159,7 +160,7 @@ mod tests {
         let all = grabs(&avi(5, 5), None).unwrap();
         assert_eq!(all.len(), 5);
         let Grab::Frame { frame, time_s } = &all[3] else { panic!("{:?}", all[3]) };
-        assert_eq!((frame.seq, *time_s, frame.size()), (3, Some(0.12), (16, 8)));
+        assert_eq!((frame.seq, *time_s, frame.size()), (3, Some(0.12), Size::new(16, 8)));
         assert!(frame.to_grey8().iter().all(|&v| v == 30));
         let Grab::Frame { time_s, .. } = grabs(&avi(5, 5), Some(10.0)).unwrap()[3].clone() else {
             panic!()

@@ -1,10 +1,11 @@
 //! The speed at which bead was laid, along the path.
 
-use super::data::Look;
-use super::data::float;
+use super::estimate::SpeedRange;
+use super::observation::Look;
 use crate::core::robot::RobotState;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS};
+use crate::numeric::number::float;
 
 /// Longest time between two reports over which the speed is taken to have changed
 /// evenly; the link counts as lost after it.
@@ -99,7 +100,7 @@ impl Course {
         clippy::cast_precision_loss,
         reason = "a share of a count"
     )]
-    pub fn range(&self, tail: f64) -> (MmPerS, MmPerS) {
+    pub fn range(&self, tail: f64) -> SpeedRange {
         let speeds = self.beads.iter().flat_map(Bead::on_grid);
         let mut speeds: Vec<f64> = speeds.filter(|&speed| speed >= self.slowest).collect();
         speeds.sort_by(f64::total_cmp);
@@ -107,7 +108,7 @@ impl Course {
         let skip = (tail * last as f64) as usize;
         let at =
             |i: usize| MmPerS::new(speeds.get(i).copied().unwrap_or(0.0)).unwrap_or(MmPerS::ZERO);
-        (at(skip), at(last - skip))
+        SpeedRange { min: at(skip), max: at(last - skip) }
     }
 
     /// Whether the speed is known, and large enough, all over the gauge of a width at an

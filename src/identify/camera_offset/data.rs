@@ -1,26 +1,15 @@
 //! Widths beside the speeds that may have laid them.
 
 use super::course::{Course, Sums};
+use super::observation::Look;
 use super::whiten::Place;
 use crate::core::units::Mm;
+use crate::numeric::number::float;
 use crate::numeric::rank;
 
 /// Shortest piece of path over which widths are taken together, under a short gauge
 /// \[mm\].
 const SHORTEST_POOL_MM: f64 = 2.0;
-
-/// A width, and where the nozzle was.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
-    /// Number of the bead.
-    pub bead: usize,
-    /// Path of the nozzle \[mm\].
-    pub path_mm: f64,
-    /// Logarithm of the width in mm.
-    pub ln_width: f64,
-    /// Standard deviation of the width, as a share of it.
-    pub share: f64,
-}
 
 /// Widths beside the speeds that may have laid them. Those whose gauges overlap share
 /// most of what makes them scatter, in a way that no course which merely forgets itself
@@ -103,10 +92,4 @@ fn ends_of_pools(looks: &[Look], length_mm: f64) -> Vec<usize> {
 /// The middle one of some numbers; `None` without any.
 pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     rank::median(&mut values.collect::<Vec<_>>())
-}
-
-/// A count as a number.
-#[expect(clippy::cast_precision_loss, reason = "a count of widths")]
-pub fn float(count: usize) -> f64 {
-    count as f64
 }

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use super::whiten::{Place, Whitener};
 use super::*;
 use crate::core::robot::RobotMode;
+use crate::core::units::MmPerS;
 
 const GAUGE_MM: f64 = 60.0;
 const SEARCH: Search = Search { gauge: Mm::constant(GAUGE_MM), farthest: Mm::constant(1000.0) };

@@ -2,9 +2,11 @@
 
 use std::fmt;
 
-use super::FEWEST_SAMPLES;
 use crate::identify::grid::Gap;
 use crate::identify::number::short;
+
+/// Samples that a model takes at least.
+pub const FEWEST_SAMPLES: usize = 50;
 
 /// Which of the two columns is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

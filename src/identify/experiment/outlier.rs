@@ -1,6 +1,6 @@
 //! Samples so far beyond all others that nothing measured them.
 
-use super::{ExperimentError, Side};
+use super::error::{ExperimentError, Side};
 
 /// A sample that lies this many times the others' range beyond them is no
 /// reading: one that a sensor can give, if a wrong one, is left to --hampel.

@@ -3,9 +3,12 @@
 
 use std::fmt;
 
-use super::samples::{FEWEST, Samples, ends};
+use super::row::ends;
 use crate::identify::number::short;
+use crate::numeric::number::float;
 
+/// Levels, each about once, from which on a signal goes through many.
+const FEWEST_LEVELS: usize = 10;
 /// Shortest run of equal samples that looks cut off.
 const RUN: usize = 3;
 /// Share of samples in such runs from which on a signal is refused.
@@ -101,25 +104,21 @@ impl fmt::Display for End {
     }
 }
 
-impl Samples {
-    /// Whether input or output were cut off. Commands that step between levels
-    /// are not taken for it, at once or over a ramp, nor an output that has not
-    /// begun to move or has come to rest.
-    pub fn check_clipped(&self) -> Result<(), Clipped> {
-        for (column, row) in [(Column::Input, self.input()), (Column::Output, self.output())] {
-            let signal = Signal::new(row);
-            let is_command =
-                column == Column::Input && (signal.is_held() || signal.is_at_one_rate());
-            for (end, value) in signal.ends() {
-                let is_cut =
-                    if is_command { signal.is_cut_command(value) } else { signal.varies() };
-                if is_cut {
-                    signal.check(column, end, value, self.dt_s())?;
-                }
+/// Whether an input or an output, `dt_s` \[s\] from sample to sample, was cut off.
+/// Commands that step between levels are not taken for it, at once or over a ramp, nor
+/// an output that has not begun to move or has come to rest.
+pub(super) fn check(input: &[f64], output: &[f64], dt_s: f64) -> Result<(), Clipped> {
+    for (column, row) in [(Column::Input, input), (Column::Output, output)] {
+        let signal = Signal::new(row);
+        let is_command = column == Column::Input && (signal.is_held() || signal.is_at_one_rate());
+        for (end, value) in signal.ends() {
+            let is_cut = if is_command { signal.is_cut_command(value) } else { signal.varies() };
+            if is_cut {
+                signal.check(column, end, value, dt_s)?;
             }
         }
-        Ok(())
     }
+    Ok(())
 }
 
 /// A row in runs of equal samples.
@@ -158,7 +157,7 @@ impl<'a> Signal<'a> {
     fn varies(&self) -> bool {
         let between = || self.runs.iter().filter(|run| !self.is_end(run[0]));
         let single = between().filter(|run| run.len() == 1).count();
-        single >= FEWEST && 2 * single >= between().map(|run| run.len()).sum()
+        single >= FEWEST_LEVELS && 2 * single >= between().map(|run| run.len()).sum()
     }
 
     /// Whether a command that mostly stands was cut off at this end: it runs
@@ -204,8 +203,8 @@ impl<'a> Signal<'a> {
         inner.sort_by(f64::total_cmp);
         inner.dedup();
         let mean = inner_visits / inner.len().max(1) as f64;
-        inner.len() >= FEWEST
-            && 2 * follow >= FEWEST
+        inner.len() >= FEWEST_LEVELS
+            && 2 * follow >= FEWEST_LEVELS
             && visits >= ARRIVALS
             && visits as f64 >= ARRIVALS as f64 * mean
     }
@@ -248,8 +247,7 @@ impl<'a> Signal<'a> {
         let cut: Vec<Stand<'_>> = self.stands().filter(is_cut).collect();
         let samples: usize = cut.iter().map(|stand| stand.len).sum();
         let Some(longest) = cut.iter().max_by_key(|stand| stand.len) else { return Ok(()) };
-        #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
-        let (share, from_s) = (samples as f64 / self.row.len() as f64, longest.from as f64 * dt_s);
+        let (share, from_s) = (float(samples) / float(self.row.len()), float(longest.from) * dt_s);
         if share <= CUT_SHARE {
             return Ok(());
         }

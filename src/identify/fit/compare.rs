@@ -1,11 +1,12 @@
 //! Several models of the same data, and which of them to take.
 
+use super::autoregression::Colour;
 use super::error::FitError;
+use super::estimate::Fit;
 use super::quality::Quality;
-use super::report::Fit;
 use super::samples::Samples;
 use super::settings::{Before, Settings};
-use super::spread::Colour;
+use crate::numeric::number::float;
 
 /// One of the models that were compared.
 #[derive(Debug, Clone)]
@@ -75,8 +76,7 @@ fn fill_bic(rows: &mut [Row]) {
     for row in rows {
         row.bic = row.fit.as_ref().ok().map(|fit| {
             let variance = (fit.quality.rmse * fit.quality.rmse).max(f64::MIN_POSITIVE);
-            #[expect(clippy::cast_precision_loss, reason = "few parameters")]
-            let k = fit.estimated as f64;
+            let k = float(fit.estimated);
             independent * libm::log(variance) + k * libm::log(independent.max(2.0))
         });
     }

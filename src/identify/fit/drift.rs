@@ -1,9 +1,11 @@
 //! An output that goes its own way with time, and a model that follows it.
 
 use super::error::FitError;
-use super::problem::{Problem, dot};
-use super::report::Fit;
+use super::estimate::Fit;
+use super::problem::Problem;
+use super::row::dot;
 use super::trend::{DOMINATES, Trend};
+use crate::numeric::number::float;
 
 /// Refuses a model of an output that a straight line in time dominates, and not
 /// the input, where the model tells no more than that line, or follows it with a
@@ -27,7 +29,6 @@ pub(super) fn check_drift(problem: &Problem, fit: &Fit) -> Result<(), FitError> 
 fn tells_more(fit: &Fit, line: &Trend) -> bool {
     let squares = dot(&fit.residuals, &fit.residuals).max(f64::MIN_POSITIVE);
     let n = fit.independent_samples.max(2.0);
-    #[expect(clippy::cast_precision_loss, reason = "few parameters")]
-    let more = fit.estimated as f64 - 2.0;
+    let more = float(fit.estimated) - 2.0;
     n * libm::log(line.squares.max(f64::MIN_POSITIVE) / squares) > more * libm::log(n)
 }

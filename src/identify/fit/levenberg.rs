@@ -1,9 +1,13 @@
-//! Least squares: in one go where it is linear, and by Levenberg's and
-//! Marquardt's steps within ranges where it is not.
+//! Least squares of a model's parameters: in one go those that act in proportion,
+//! and by Levenberg's and Marquardt's steps within ranges the others.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::problem::{Problem, dot};
+use super::linear::{nearest, normal_matrix};
+use super::problem::Problem;
+use super::row::dot;
+use super::settings::Level;
+use crate::numeric::number::float;
 
 /// Where the steps ended.
 #[derive(Debug, Clone)]
@@ -13,38 +17,12 @@ pub(super) struct Outcome {
     pub squares: f64,
 }
 
-/// Coefficients of the columns that together come nearest to a row, the smallest
-/// such where columns repeat each other.
-pub(super) fn nearest(columns: &[Vec<f64>], target: &[f64]) -> Option<Vec<f64>> {
-    let sizes: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt().max(f64::MIN_POSITIVE)).collect();
-    let n = columns.len();
-    let normal = normal_matrix(columns, &sizes);
-    let right = DVector::from_fn(n, |i, _| dot(&columns[i], target) / sizes[i]);
-    let solved = normal.svd(true, true).solve(&right, 1e-13).ok()?;
-    let found: Vec<f64> = solved.iter().zip(&sizes).map(|(x, size)| x / size).collect();
-    found.iter().all(|x| x.is_finite()).then_some(found)
-}
-
-/// All products of columns that are divided by sizes.
-pub(super) fn normal_matrix(columns: &[Vec<f64>], sizes: &[f64]) -> DMatrix<f64> {
-    let n = columns.len();
-    let mut normal = DMatrix::zeros(n, n);
-    for i in 0..n {
-        for j in 0..=i {
-            let product = dot(&columns[i], &columns[j]) / (sizes[i] * sizes[j]);
-            normal[(i, j)] = product;
-            normal[(j, i)] = product;
-        }
-    }
-    normal
-}
-
 /// Puts the parameters that act in proportion where they fit best.
 pub(super) fn fill_linear(problem: &Problem, theta: &mut [f64]) -> Option<f64> {
     let (numbers, columns) = problem.linear_columns(theta)?;
     let known = match problem.level {
-        super::Level::Known(level) => level,
-        super::Level::Estimated => 0.0,
+        Level::Known(level) => level,
+        Level::Estimated => 0.0,
     };
     let target: Vec<f64> = problem.output.iter().map(|y| y - known).collect();
     let found = nearest(&columns, &target)?;
@@ -72,8 +50,7 @@ pub(super) fn descend(problem: &Problem, start: &[f64], most_steps: usize) -> Op
     let mut squares = dot(&left, &left);
     let mut damping = 1e-3;
     // Less than this of the residuals' variance tells nothing about a parameter.
-    #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
-    let nothing = 1e-5 / left.len() as f64;
+    let nothing = 1e-5 / float(left.len());
     let mut idle = 0;
     for _ in 0..most_steps {
         let scales = problem.scales(&theta);

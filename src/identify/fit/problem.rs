@@ -6,9 +6,11 @@
 //! before), then dead time, output level and the free response where they are
 //! estimated.
 
+use super::row::standard_deviation;
 use super::samples::Samples;
 use super::settings::{Before, DeadTime, Level, Settings};
 use crate::numeric::lti::{Between, ModelError, Simulator, TransferFunction, polynomial};
+use crate::numeric::number::float;
 
 /// A pole faster than this many in a step is not seen.
 const FASTEST_PER_STEP: f64 = 50.0;
@@ -64,8 +66,7 @@ impl Problem {
     /// The same with the means of so many samples each: input and output that are
     /// averaged alike still belong together.
     pub fn thinned(&self, factor: usize) -> Self {
-        #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
-        let n = factor as f64;
+        let n = float(factor);
         let means = |row: &[f64]| -> Vec<f64> {
             row.chunks_exact(factor).map(|part| part.iter().sum::<f64>() / n).collect()
         };
@@ -176,17 +177,17 @@ impl Problem {
         let mut time = 0.0_f64;
         for i in 1..=self.poles {
             let alpha = theta[layout.poles_from + i - 1].abs();
-            time = time.max(libm::pow(alpha, 1.0 / exponent(i)));
+            time = time.max(libm::pow(alpha, 1.0 / float(i)));
         }
         let time = time.max(self.dt_s);
-        let unit = |i: usize| libm::pow(time, exponent(i));
+        let unit = |i: usize| libm::pow(time, float(i));
         let gain = (0..=self.zeros).map(|i| theta[i].abs() / unit(i)).fold(tiny, f64::max);
         let mut scales: Vec<f64> = (0..=self.zeros).map(|i| gain * unit(i)).collect();
         scales.extend((1..=self.poles).map(unit));
         if layout.dead_time.is_some() {
             scales.push(time);
         }
-        let swing = spread(&self.output).max(tiny);
+        let swing = standard_deviation(&self.output).max(tiny);
         if layout.level.is_some() {
             scales.push(swing);
         }
@@ -281,20 +282,3 @@ pub(super) fn free_responses(
 
 /// Step of the differences as a part of a parameter's size.
 const STEP: f64 = 1e-5;
-
-#[expect(clippy::cast_precision_loss, reason = "an order is small")]
-fn exponent(i: usize) -> f64 {
-    i as f64
-}
-
-/// Standard deviation of a row.
-pub(super) fn spread(row: &[f64]) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
-    let n = row.len() as f64;
-    let mean = row.iter().sum::<f64>() / n;
-    (row.iter().map(|y| (y - mean) * (y - mean)).sum::<f64>() / n).sqrt()
-}
-
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}

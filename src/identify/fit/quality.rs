@@ -1,5 +1,7 @@
 //! How well a prediction meets what was measured.
 
+use crate::numeric::number::float;
+
 /// How well a prediction meets what was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quality {
@@ -19,8 +21,7 @@ impl Quality {
     /// changes has a fit of minus infinity.
     pub fn of(measured: &[f64], predicted: &[f64]) -> Option<Self> {
         let count = measured.len().min(predicted.len());
-        #[expect(clippy::cast_precision_loss, reason = "a record has fewer than 2^52 samples")]
-        let n = count as f64;
+        let n = float(count);
         if count == 0 {
             return None;
         }

@@ -1,7 +1,9 @@
 //! Samples of an input and an output, and whether a model can be told from
 //! them.
 
+use super::clipped;
 use super::clipped::Clipped;
+use super::row::ends;
 use super::settings::Before;
 use crate::identify::number::short;
 
@@ -87,7 +89,7 @@ pub struct Samples {
 }
 
 /// A record shorter than this is none.
-pub(super) const FEWEST: usize = 10;
+const FEWEST: usize = 10;
 /// Change of an input as a part of its level that is noise of the arithmetic.
 const HARDLY: f64 = 1e-4;
 
@@ -136,6 +138,11 @@ impl Samples {
         self.len() as f64 * self.dt_s
     }
 
+    /// Whether input or output were cut off.
+    pub fn check_clipped(&self) -> Result<(), Clipped> {
+        clipped::check(&self.input, &self.output, self.dt_s)
+    }
+
     /// Whether the input changes, if only from what came before, and so does the
     /// output.
     pub fn check_input(&self, before: Before) -> Result<(), SamplesError> {
@@ -160,10 +167,6 @@ fn finite(what: &'static str, row: &[f64]) -> Result<(), SamplesError> {
         Some((at, value)) => Err(SamplesError::NotFinite { what, value: *value, at }),
         None => Ok(()),
     }
-}
-
-pub(super) fn ends(row: &[f64]) -> [f64; 2] {
-    row.iter().fold([f64::MAX, f64::MIN], |[least, most], v| [least.min(*v), most.max(*v)])
 }
 
 #[cfg(test)]

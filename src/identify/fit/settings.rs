@@ -1,9 +1,9 @@
 //! What is fitted.
 
-use super::MOST_POLES;
-use super::error::FitError;
-use super::samples::Samples;
 use crate::numeric::lti::Between;
+
+/// Most poles of a fit.
+pub const MOST_POLES: usize = 4;
 
 /// Form of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -138,30 +138,4 @@ impl Settings {
         let free = if self.before == Before::Unknown { poles } else { 0 };
         self.structure.zeros() + 1 + poles + dead_time + level + free
     }
-
-    pub(super) fn check(&self, samples: &Samples) -> Result<(), FitError> {
-        let (poles, zeros) = (self.structure.poles(), self.structure.zeros());
-        if poles == 0 || poles > MOST_POLES || zeros > poles {
-            return Err(FitError::Order { poles, zeros });
-        }
-        let (least_s, most_s) = match self.dead_time {
-            DeadTime::Given(given) => (given, given),
-            DeadTime::Estimated { least_s, most_s } => (least_s, most_s),
-        };
-        let most_allowed_s = 0.5 * samples.duration_s();
-        let possible = least_s >= 0.0 && most_s >= least_s && most_s <= most_allowed_s;
-        let estimated = matches!(self.dead_time, DeadTime::Estimated { .. });
-        if !possible || (estimated && most_s == least_s) {
-            return Err(FitError::DeadTimeRange { least_s, most_s, most_allowed_s });
-        }
-        let (found, parameters) = (samples.len(), self.parameters());
-        let needed = SAMPLES_A_PARAMETER * parameters;
-        if found < needed {
-            return Err(FitError::TooFewForParameters { found, parameters, needed });
-        }
-        Ok(())
-    }
 }
-
-/// Fewer samples for each parameter say nothing about the noise.
-const SAMPLES_A_PARAMETER: usize = 5;

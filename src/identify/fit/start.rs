@@ -4,10 +4,12 @@
 use nalgebra::Complex;
 
 use super::error::FitError;
-use super::levenberg::{Outcome, descend, fill_linear, nearest};
+use super::levenberg::{Outcome, descend, fill_linear};
+use super::linear::nearest;
 use super::problem::Problem;
 use super::settings::{DeadTime, Level};
 use crate::numeric::lti::{Between, Simulator, TransferFunction, polynomial};
+use crate::numeric::number::float;
 
 /// Bandwidths of the filter, evenly spread in their logarithm.
 const BANDWIDTHS: u32 = 5;
@@ -102,8 +104,7 @@ fn dead_times(problem: &Problem) -> Vec<f64> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
     let steps = ((most_s - least_s) / problem.dt_s).ceil() as usize;
     let count = steps.clamp(1, MOST_DEAD_TIMES - 1);
-    #[expect(clippy::cast_precision_loss, reason = "at most 25")]
-    let at = |k: usize| least_s + (most_s - least_s) * k as f64 / count as f64;
+    let at = |k: usize| least_s + (most_s - least_s) * float(k) / float(count);
     (0..=count).map(at).collect()
 }
 

@@ -1,6 +1,7 @@
 //! A straight line in time through a row: how much of it is drift.
 
-use super::spread::Colour;
+use super::autoregression::Colour;
+use crate::numeric::number::float;
 
 /// Least F ratio at which a line is more than chance.
 const SEEN: f64 = 15.0;
@@ -23,10 +24,10 @@ pub struct Trend {
 impl Trend {
     /// Of a row at even times; of fewer than two samples there is none.
     pub fn of(row: &[f64]) -> Self {
-        let n = as_f64(row.len().max(1));
+        let n = float(row.len().max(1));
         let mean = row.iter().sum::<f64>() / n;
         let middle = 0.5 * (n - 1.0);
-        let from_middle = |k: usize| as_f64(k) - middle;
+        let from_middle = |k: usize| float(k) - middle;
         let (mut along, mut across, mut whole) = (0.0, 0.0, 0.0);
         for (k, value) in row.iter().enumerate() {
             along += from_middle(k) * from_middle(k);
@@ -43,9 +44,9 @@ impl Trend {
 
     /// A row without its line; the row's mean stays.
     pub fn taken_off(&self, row: &[f64]) -> Vec<f64> {
-        let last = as_f64(row.len().max(2)) - 1.0;
+        let last = float(row.len().max(2)) - 1.0;
         let slope = self.rise / last;
-        row.iter().enumerate().map(|(k, value)| value - slope * (as_f64(k) - 0.5 * last)).collect()
+        row.iter().enumerate().map(|(k, value)| value - slope * (float(k) - 0.5 * last)).collect()
     }
 
     /// The line through a row where it is more than chance: more than a tenth of
@@ -56,17 +57,12 @@ impl Trend {
         if trend.share < SMALL {
             return None;
         }
-        let mean = row.iter().sum::<f64>() / as_f64(row.len().max(1));
+        let mean = row.iter().sum::<f64>() / float(row.len().max(1));
         let left: Vec<f64> = trend.taken_off(row).iter().map(|value| value - mean).collect();
         let ratio = trend.share / (1.0 - trend.share).max(f64::MIN_POSITIVE)
             * Colour::of(&left).independent(left.len());
         (ratio > SEEN).then_some(trend)
     }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "counts of samples")]
-fn as_f64(count: usize) -> f64 {
-    count as f64
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! Starts and stops in a recording: when the command says so, and the flow
 //! about each.
 
-use super::StartStopFitError;
+use super::error::StartStopFitError;
 use crate::identify::grid::usual_step;
 use crate::identify::series::Series;
+use crate::numeric::number::float;
 use crate::numeric::rank;
 
 /// A command above this share of its largest value runs the pump.
@@ -119,8 +120,7 @@ fn episode(
     let part = flow.within(from_s, to_s);
     let pairs = part.time_s.iter().zip(&part.values);
     let samples: Vec<(f64, f64)> = pairs.map(|(t, q)| (t - from_s, q / even)).collect();
-    #[expect(clippy::cast_precision_loss, reason = "some thousand samples")]
-    let seen_s = samples.len() as f64 * step_s;
+    let seen_s = float(samples.len()) * step_s;
     let is_whole = seen_s >= SEEN_SHARE * (to_s - from_s);
     is_whole.then_some(Episode { at_s: from_s, idle_s, flow: even, before, samples, step_s })
 }
@@ -191,8 +191,7 @@ fn run(flow: &Series, told: &Told, to_s: f64, is_told_to_stop: bool) -> Run {
     let even = rank::median(&mut end.clone()).unwrap_or(0.0);
     let mut off: Vec<f64> =
         end.windows(2).filter_map(|pair| Some((pair.get(1)? - pair.first()?).abs())).collect();
-    #[expect(clippy::cast_precision_loss, reason = "some thousand samples")]
-    let chance = NOISE_FACTOR * rank::median(&mut off).unwrap_or(0.0) / (end.len() as f64).sqrt();
+    let chance = NOISE_FACTOR * rank::median(&mut off).unwrap_or(0.0) / float(end.len()).sqrt();
     // A flow that still comes up grows from one half to the other.
     let grows = late.zip(early).map_or(f64::INFINITY, |(late, early)| (late - early).abs());
     let is_level = told.high - told.low <= UNEVEN_SHARE * told.high;

@@ -2,9 +2,11 @@
 //! before.
 
 use super::episodes::Episode;
-use super::least::descend;
+use super::error::StartStopFitError;
+use super::estimate::SeenStop;
+use super::least_squares::descend;
 use super::parameters::StartStop;
-use super::{SeenStop, StartStopFitError};
+use crate::numeric::number::float;
 
 /// Parameters of a fall; see [`StartStop`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,8 +83,7 @@ fn check_ends(stops: &[Episode]) -> Result<(), StartStopFitError> {
     let Some(longest) = longest else { return Err(StartStopFitError::NoFit { what: "fall" }) };
     let tail = longest.samples.len().div_ceil(TAIL_PART);
     let last = || longest.samples.iter().rev().take(tail).map(|(_, share)| share);
-    #[expect(clippy::cast_precision_loss, reason = "some hundred samples")]
-    let n = tail.max(1) as f64;
+    let n = float(tail.max(1));
     let left = last().sum::<f64>() / n;
     let chance = last().map(|share| (share - left).powi(2)).sum::<f64>().sqrt() / n;
     if left - 3.0 * chance <= MOST_LEFT {

@@ -1,6 +1,6 @@
 //! The file of starts and stops, `starts.toml`. Version 1.
 
-use super::StartStopFit;
+use super::estimate::StartStopFit;
 use super::parameters::StartStop;
 use crate::document::{Document, Problems, Table};
 use crate::identify::file::{Setting, number, put, put_setting, read_setting, row};

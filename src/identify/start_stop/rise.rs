@@ -2,10 +2,11 @@
 //! starts have in common.
 
 use super::episodes::Episode;
+use super::error::StartStopFitError;
+use super::estimate::SeenStart;
 use super::fall::Falling;
-use super::least::descend;
+use super::least_squares::descend;
 use super::parameters::StartStop;
-use super::{SeenStart, StartStopFitError};
 use crate::numeric::rank;
 
 /// What was found of the starts.

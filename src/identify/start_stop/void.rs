@@ -1,8 +1,10 @@
 //! The delay of the first flow over the pause before it: a void that opens and
 //! must be filled.
 
-use super::least::descend;
-use super::{SeenStart, StartStopFitError};
+use super::error::StartStopFitError;
+use super::estimate::SeenStart;
+use super::least_squares::descend;
+use crate::numeric::number::float;
 
 /// Parameters of the delay; see [`crate::extruder::start_stop::StartStop`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,8 +59,7 @@ pub(super) fn fit(starts: &[SeenStart]) -> Result<Void, StartStopFitError> {
         _ => None,
     };
     let (value, sigma) = of(&best.at).zip(of(&best.sigma)).ok_or(nothing)?;
-    #[expect(clippy::cast_precision_loss, reason = "a recording has few starts")]
-    let scatter_s = (best.squares / (starts.len() as f64 - 3.0).max(1.0)).sqrt();
+    let scatter_s = (best.squares / (float(starts.len()) - 3.0).max(1.0)).sqrt();
     let found = Void { value, sigma, scatter_s };
     check(&found, [shortest_s, longest_s], flow)?;
     Ok(found)

@@ -5,6 +5,7 @@ use super::*;
 use crate::cell::file::KeepFrames;
 use crate::control::step::{State, Trace};
 use crate::core::frame::{Channel, Pixels};
+use crate::core::geometry::Size;
 use crate::core::robot::{RobotLimits, RobotMode, RobotState};
 use crate::core::units::{Mm, MmPerS};
 use crate::io::image_file;
@@ -38,7 +39,10 @@ fn event(n: u64) -> Event {
 
 fn frame(seq: u64) -> Arc<Frame> {
     let pixels = (0..48).map(|at| u8::try_from((at * 5 + seq) % 256).unwrap()).collect();
-    Arc::new(Frame::new(seq, Stamp::from_ns(seq * 1000), (8, 6), Pixels::Grey8(pixels)).unwrap())
+    Arc::new(
+        Frame::new(seq, Stamp::from_ns(seq * 1000), Size::new(8, 6), Pixels::Grey8(pixels))
+            .unwrap(),
+    )
 }
 
 fn read(bytes: Vec<u8>) -> Recording {
@@ -217,7 +221,7 @@ fn a_handle_that_is_dropped_finishes_its_recording() {
 #[test]
 fn frames_of_both_depths_are_kept_without_loss() {
     let deep = Pixels::Grey16(vec![0, 1, 255, 256, 4095, 65535]);
-    let deep = Arc::new(Frame::new(2, Stamp::from_ns(77), (3, 2), deep).unwrap());
+    let deep = Arc::new(Frame::new(2, Stamp::from_ns(77), Size::new(3, 2), deep).unwrap());
     let disk = Disk::default();
     let config = RecordConfig { frames: KeepFrames::Every(2), ..config() };
     let (recorder, _alarms) = start_with(&config, disk.clone(), quick()).unwrap();

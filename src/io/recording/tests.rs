@@ -4,6 +4,7 @@ use std::sync::Arc;
 use super::*;
 use crate::cell::file::KeepFrames;
 use crate::core::frame::{Frame, Pixels};
+use crate::core::geometry::Size;
 use crate::io::record::{RecordConfig, start};
 use crate::run::ports::Recorder;
 
@@ -35,7 +36,7 @@ fn record(events: u64, text: usize) -> Vec<u8> {
         recorder.record(now, &event, &Step::default()).unwrap();
         if n % 40 == 0 {
             let values = (0..600).map(|at| (at * n % 251).to_le_bytes()[0]).collect();
-            let frame = Frame::new(n, now, (30, 20), Pixels::Grey8(values)).unwrap();
+            let frame = Frame::new(n, now, Size::new(30, 20), Pixels::Grey8(values)).unwrap();
             recorder.frame(Arc::new(frame));
         }
     }

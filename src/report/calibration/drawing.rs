@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::calibration::map::{CELLS, WidthMap};
+use crate::calibration::map::{CELLS, Cells, WidthMap};
 use crate::calibration::share_map::ShareMap;
 use crate::calibration::solve::{Solution, View};
 use crate::numeric::rank;
@@ -132,7 +132,7 @@ pub fn residuals(solution: &Solution, times: f64) -> Markup {
 pub fn width_map(solution: &Solution, map: &WidthMap) -> Markup {
     let drawing = Drawing::of(solution.image_size_px);
     let [width, height] = drawing.size_px;
-    let (columns, rows) = CELLS;
+    let Cells { columns, rows } = CELLS;
     let edge = |at: u32, count: u32, side: f64| f64::from(at) / f64::from(count) * side - 0.5;
     let area = |i: u32| {
         let (column, row) = (i % columns, i / columns);

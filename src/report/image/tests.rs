@@ -1,5 +1,6 @@
 use super::*;
 use crate::core::frame::Pixels;
+use crate::core::geometry::Size;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::rows::frame_row::sample;
@@ -18,7 +19,13 @@ fn gauge(roi: Roi) -> Gauge {
 }
 
 fn grey(size: (usize, usize), value: u8) -> Frame {
-    Frame::new(3, Stamp::START, size, Pixels::Grey8(vec![value; size.0 * size.1])).unwrap()
+    Frame::new(
+        3,
+        Stamp::START,
+        Size::new(size.0, size.1),
+        Pixels::Grey8(vec![value; size.0 * size.1]),
+    )
+    .unwrap()
 }
 
 /// Centre of what is coloured like an ink, weighted by nothing.

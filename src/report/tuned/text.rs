@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::Tuned;
+use crate::identify::camera_offset::SpeedRange;
 use crate::tune::predict::{FLOW_STEP, Prediction, SEEDS};
 use crate::tune::stability::LoopMargins;
 use crate::width_control::pi::PiGains;
@@ -28,7 +29,7 @@ impl Tuned {
     pub fn found(&self) -> Vec<(&'static str, String)> {
         let plant = &self.plant;
         let (width, exponent, offset) = (plant.width_mm, plant.exponent, plant.offset_mm);
-        let (from, to) = plant.study.found.speeds;
+        let SpeedRange { min: from, max: to } = plant.study.found.speeds;
         vec![
             (
                 "bead",

@@ -25,7 +25,7 @@ mod recipes;
 mod scene;
 
 use crate::core::frame::{Frame, Pixels, WrongSize};
-use crate::core::geometry::Roi;
+use crate::core::geometry::{Roi, Size};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::vision::{Axis, Gauge, Polarity};
@@ -60,7 +60,12 @@ impl DrawnSet {
         let scene = (self.scene)(&mut draw);
         let painted = paint::paint(&scene, &mut draw);
         let pixels = camera::expose(&painted.light, &scene, &mut draw);
-        let frame = Frame::new(number, Stamp::START, scene.size, Pixels::Grey8(pixels))?;
+        let frame = Frame::new(
+            number,
+            Stamp::START,
+            Size::new(scene.size.0, scene.size.1),
+            Pixels::Grey8(pixels),
+        )?;
         let gauge = gauge(&scene, self.knows_gamma);
         Ok(DrawnFrame { frame, gauge, truth_px: painted.truth_px, parameters: draw.record() })
     }

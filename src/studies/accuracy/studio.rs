@@ -112,7 +112,7 @@ mod tests {
             let (first, second) = (studio.take(0).unwrap(), studio.take(1).unwrap());
             let size = if set.tilted { [720, 540] } else { set.size_px() };
             let size = size.map(|side| usize::try_from(side).unwrap());
-            assert_eq!(first.frame.size(), size.into());
+            assert_eq!([first.frame.width(), first.frame.height()], size);
             assert_eq!(studio.take(0).unwrap(), first);
             let truths = [&first, &second].map(|rendered| rendered.truth.unwrap());
             assert_ne!(truths[0].width_mm, truths[1].width_mm);

@@ -1,7 +1,7 @@
 use super::*;
 use crate::calibration::{Calibration, Camera};
 use crate::core::frame::Pixels;
-use crate::core::geometry::{Pose, Roi};
+use crate::core::geometry::{Pose, Roi, Size};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
 use crate::vision::gauge::{Axis, EdgeKind, Polarity};
@@ -37,7 +37,7 @@ fn frame_of_gamma_in_noise(gamma: f64, noise_grey: f64, seed: u64) -> Frame {
     };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "8 bits")]
     let values = (0..60 * 400u16).map(|k| level(k % 400).round() as u8).collect();
-    Frame::new(0, Stamp::START, SIZE, Pixels::Grey8(values)).unwrap()
+    Frame::new(0, Stamp::START, Size::new(SIZE.0, SIZE.1), Pixels::Grey8(values)).unwrap()
 }
 
 fn gauge(from: usize, to: usize) -> Gauge {
@@ -65,7 +65,7 @@ fn frame_with_grooves(seed: u64) -> Frame {
     };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "8 bits")]
     let values = (0..60 * 400u16).map(|k| level(k % 400).round() as u8).collect();
-    Frame::new(0, Stamp::START, SIZE, Pixels::Grey8(values)).unwrap()
+    Frame::new(0, Stamp::START, Size::new(SIZE.0, SIZE.1), Pixels::Grey8(values)).unwrap()
 }
 
 /// Half of the height above a groove that blur fills lies inside the bead; who says that
@@ -175,7 +175,8 @@ fn light_behind_16_bits_is_the_same_as_behind_8() {
     let frame = frame_of_gamma(0.45, 11);
     let Pixels::Grey8(values) = frame.pixels() else { unreachable!() };
     let deep = values.iter().map(|&value| u16::from(value) * 16).collect();
-    let deep = Frame::new(0, Stamp::START, SIZE, Pixels::Grey16(deep)).unwrap();
+    let deep =
+        Frame::new(0, Stamp::START, Size::new(SIZE.0, SIZE.1), Pixels::Grey16(deep)).unwrap();
     let of = |frame, white| Measurer::new(gauge, white).measure(frame, &scale).unwrap();
     let (bytes, words) = (of(&frame, None), of(&deep, Some(255 * 16)));
     assert!((bytes.width.get() - words.width.get()).abs() < 1e-3, "{bytes:?} {words:?}");

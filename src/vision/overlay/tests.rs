@@ -1,6 +1,6 @@
 use super::*;
 use crate::core::frame::{Frame, Pixels};
-use crate::core::geometry::Roi;
+use crate::core::geometry::{Roi, Size};
 use crate::core::time::Stamp;
 use crate::numeric::blurred_step::StepTable;
 use crate::vision::gauge::Axis;
@@ -27,7 +27,8 @@ fn overlay(beside: impl Fn(f64) -> f64) -> Overlay {
     };
     let columns = u16::try_from(COLUMNS).unwrap();
     let values = (0..ROWS).flat_map(|_| (0..columns).map(shown)).collect();
-    let frame = Frame::new(0, Stamp::START, (COLUMNS, ROWS), Pixels::Grey16(values)).unwrap();
+    let frame =
+        Frame::new(0, Stamp::START, Size::new(COLUMNS, ROWS), Pixels::Grey16(values)).unwrap();
     let view = View::new(Roi { x: 0, y: 0, width: COLUMNS, height: ROWS }, Axis::Vertical);
     let mut turner = Turner::default();
     let Strips::Words(strip) = turner.strips(&frame, &view, None) else { unreachable!() };

@@ -1,6 +1,7 @@
 //! `foxglove.RawImage` as a frame.
 
 use crate::core::frame::{Channel, Frame, Layout, Pixels};
+use crate::core::geometry::Size;
 use crate::core::time::Stamp;
 use crate::io::foxglove::RawImage;
 
@@ -42,7 +43,8 @@ pub fn decode(
             rows.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect(),
         ),
     };
-    Frame::new(seq, captured_at, size, pixels).map_err(|error| error.to_string())
+    Frame::new(seq, captured_at, Size::new(size.0, size.1), pixels)
+        .map_err(|error| error.to_string())
 }
 
 /// The rows without what pads them.

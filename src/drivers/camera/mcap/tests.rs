@@ -7,6 +7,7 @@ use crate::cell::file::KeepFrames;
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::frame::Pixels;
+use crate::core::geometry::Size;
 use crate::core::robot::{RobotMode, RobotState};
 use crate::core::units::{Mm, MmPerS};
 use crate::io::foxglove::timestamp;
@@ -15,7 +16,7 @@ use crate::run::ports::Recorder;
 
 fn frame(seq: u64, ms: u64) -> Frame {
     let values = (0..12).map(|at| (at * 20 + seq).to_le_bytes()[0]).collect();
-    Frame::new(seq, Stamp::from_ns(ms * 1_000_000), (4, 3), Pixels::Grey8(values)).unwrap()
+    Frame::new(seq, Stamp::from_ns(ms * 1_000_000), Size::new(4, 3), Pixels::Grey8(values)).unwrap()
 }
 
 struct Foreign {

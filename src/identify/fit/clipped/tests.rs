@@ -5,6 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
+use crate::identify::fit::Samples;
 use crate::identify::prbs::Prbs;
 
 fn sine(n: u32) -> Vec<f64> {

@@ -9,6 +9,7 @@ use super::paint::{Painted, paint};
 use super::recipes;
 use super::scene::Scene;
 use crate::core::frame::{Frame, Pixels, WrongSize};
+use crate::core::geometry::Size;
 use crate::core::time::Stamp;
 use crate::sim::hash;
 use crate::vision::Gauge;
@@ -97,7 +98,8 @@ impl LongBead {
         let light = &self.painted.light[first_row * size.0..last_row * size.0];
         let mut noise = Draw::new(NAME, hash::mix(&[self.number, frame]));
         let pixels = camera::expose(light, &self.scene, &mut noise);
-        let frame = Frame::new(frame, Stamp::START, size, Pixels::Grey8(pixels))?;
+        let frame =
+            Frame::new(frame, Stamp::START, Size::new(size.0, size.1), Pixels::Grey8(pixels))?;
         Ok(Passage { frame, truth_px: self.painted.mean_width_px(first_row..last_row) })
     }
 }

@@ -2,10 +2,12 @@
 //! each.
 
 use super::course::Course;
-use super::data::{Data, Look, float, median};
+use super::data::{Data, median};
+use super::estimate::{EXPONENTS, Seen};
+use super::observation::Look;
 use super::whiten::{Noise, Whitener};
-use super::{EXPONENTS, Seen};
 use crate::core::units::Mm;
+use crate::numeric::number::float;
 
 /// Steps of the offset at first, as a part of the gauge's length, and their limits
 /// \[mm\].
@@ -44,6 +46,15 @@ impl Fit {
     fn explains(&self) -> f64 {
         self.squares_without - self.squares
     }
+}
+
+/// When a fit is nearly as good as the best one: either is enough.
+#[derive(Debug, Clone, Copy)]
+pub struct NearlyAsGood {
+    /// By how much its sum of squares may be larger, in units of the noise's variance.
+    pub worse: f64,
+    /// Fraction of what the best one explains that it must explain.
+    pub explained: f64,
 }
 
 /// What is left at each offset, with a known noise.
@@ -243,11 +254,10 @@ impl Profile {
         candidates.map(|(_, fit)| fit.offset_mm).filter(|&offset| is_apart(offset)).collect()
     }
 
-    /// Whether a fit is worse than another by no more than so many units of the noise, or
-    /// explains as much but for a share.
-    pub fn as_good(&self, fit: &Fit, best: &Fit, (worse, share): (f64, f64)) -> bool {
-        fit.squares - best.squares <= worse * self.variance(best)
-            || fit.explains() >= share * best.explains()
+    /// Whether a fit is nearly as good as the best one.
+    pub fn as_good(&self, fit: &Fit, best: &Fit, limits: NearlyAsGood) -> bool {
+        fit.squares - best.squares <= limits.worse * self.variance(best)
+            || fit.explains() >= limits.explained * best.explains()
     }
 
     /// The noise with which what is left at an offset is likeliest.

@@ -1,7 +1,41 @@
 //! All that is known of a bead once its offset is.
 
-use super::Found;
-use crate::core::units::MmPerS;
+use crate::core::units::{Mm, MmPerS};
+
+/// Exponents b that a bead may have. The bead of Shojaei Barjuei et al. 2022 has 0.22 to
+/// 0.27, one whose mass alone counts has 1.
+pub const EXPONENTS: (f64, f64) = (0.1, 2.0);
+
+/// Slowest and fastest speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpeedRange {
+    /// The slowest.
+    pub min: MmPerS,
+    /// The fastest.
+    pub max: MmPerS,
+}
+
+/// An offset that was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found {
+    /// Path length from the nozzle back to the middle of the gauge.
+    pub offset: Mm,
+    /// Its standard deviation.
+    pub sigma: Mm,
+    /// Exponent b of the bead.
+    pub exponent: f64,
+    /// Whether the exponent is at an end of [`EXPONENTS`], beyond which none is tried.
+    pub at_bound: bool,
+    /// Speeds at which the bead was laid, the outermost 2 % left out.
+    pub speeds: SpeedRange,
+    /// Widths that told it.
+    pub used: usize,
+    /// Widths that did not: measured while no bead was laid, of bead whose speed is not
+    /// known or nearly none, or far off their neighbours.
+    pub left_out: usize,
+    /// What is left of the widths, as a share (root mean square).
+    pub scatter: f64,
+}
 
 /// The bead's model that was fitted, and the widths beside it.
 #[derive(Debug, Clone, PartialEq)]

@@ -12,7 +12,8 @@ impl Fields<'_> {
     /// The camera of its matrix and its coefficients, of which there may be so many.
     pub fn camera(
         &self,
-        (matrix, distortion): (Option<Matrix>, Option<Matrix>),
+        matrix: Option<Matrix>,
+        distortion: Option<Matrix>,
         counts: &[usize],
         size: Option<[u32; 2]>,
     ) -> Option<Camera> {

@@ -1,0 +1,64 @@
+//! Why no board with markers is found.
+
+use crate::calibration::dictionary::Dictionary;
+use crate::core::geometry::GridSize;
+
+/// Why no board with markers is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NoMarkers {
+    /// There are none, or too few.
+    #[error("no board with markers of {} cells: {found} of them show", dictionary.name())]
+    None {
+        /// Markers of the right dictionary.
+        found: usize,
+        /// The dictionary.
+        dictionary: Dictionary,
+    },
+    /// There are others.
+    #[error("markers of {} cells show, not of {}: correct --dictionary", found.name(), expected.name())]
+    Other {
+        /// The dictionary of those that show.
+        found: Dictionary,
+        /// The one that was told.
+        expected: Dictionary,
+    },
+    /// They can be read in the mirror.
+    #[error(
+        "the board is mirrored: its markers can only be read in the mirror image; let the \
+         camera not flip its pictures, and look at the board itself"
+    )]
+    Mirrored,
+    /// They are not where they should be.
+    #[error(
+        "the markers are not in the order of a board with {}x{} inner corners: {fit} of {of} are \
+         where they should be{}", expected.columns, expected.rows, meant_text(*.meant)
+    )]
+    Order {
+        /// Markers that fit.
+        fit: usize,
+        /// Markers that were read.
+        of: usize,
+        /// The board's inner corners along a row and along a column.
+        expected: GridSize,
+        /// Inner corners along a row of a board that they would fit.
+        meant: Option<usize>,
+    },
+    /// They have another size.
+    #[error(
+        "the markers measure {found_percent} % of a square's side, not {expected_percent} %: correct \
+         --marker-mm or --square-mm"
+    )]
+    Size {
+        /// Their size, over a square's side \[%\].
+        found_percent: u32,
+        /// What was told \[%\].
+        expected_percent: u32,
+    },
+}
+
+fn meant_text(meant: Option<usize>) -> String {
+    meant.map_or_else(
+        || "; it is another board, or its markers were printed in another order".to_owned(),
+        |columns| format!("; they fit one of {columns} columns: count again and correct --board"),
+    )
+}

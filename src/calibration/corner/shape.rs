@@ -1,0 +1,149 @@
+//! What a corner looks like: the product of two blurred steps across lines that cross,
+//! and how it answers to the numbers that describe it.
+
+use nalgebra::{SMatrix, SVector, Vector2};
+
+use crate::numeric::blurred_step::StepTable;
+
+/// Place, directions of the two lines, blur; then mean, contrast and the slopes of the
+/// light.
+pub const NUMBERS: usize = 9;
+const BLUR_PX: std::ops::RangeInclusive<f64> = 0.2..=8.0;
+
+/// A pixel of the window: where it is from the rough corner, and its value.
+pub struct Sample {
+    pub at: Vector2<f64>,
+    pub value: f64,
+}
+
+/// The numbers of the model.
+#[derive(Debug, Clone, Copy)]
+pub struct Corner {
+    /// From the rough corner \[px\].
+    pub at: Vector2<f64>,
+    /// Directions of the lines \[rad\].
+    pub turns: [f64; 2],
+    /// How much they bend \[1/px\]; known beforehand.
+    pub bends: [f64; 2],
+    pub blur: f64,
+    /// Mean, half the contrast, slopes of the light.
+    pub levels: [f64; 4],
+}
+
+/// The corner with the directions of its lines worked out.
+#[derive(Debug, Clone, Copy)]
+pub struct Model {
+    pub corner: Corner,
+    pub along: [Vector2<f64>; 2],
+    pub normals: [Vector2<f64>; 2],
+}
+
+impl Model {
+    pub fn of(corner: Corner) -> Self {
+        let along = corner.turns.map(|turn| {
+            let (sin, cos) = turn.sin_cos();
+            Vector2::new(cos, sin)
+        });
+        Self { corner, along, normals: along.map(|along| Vector2::new(-along.y, along.x)) }
+    }
+
+    /// The value that is expected at a place, and how it answers to the numbers.
+    #[inline]
+    pub fn at(&self, table: &StepTable, place: Vector2<f64>) -> (f64, SVector<f64, NUMBERS>) {
+        let Corner { at, bends, blur, levels: [mean, half, by_x, by_y], .. } = self.corner;
+        let from = place - at;
+        let along = self.along.map(|direction| direction.dot(&from));
+        let aside: [f64; 2] = std::array::from_fn(|line| {
+            self.normals[line].dot(&from) - 0.5 * bends[line] * along[line] * along[line]
+        });
+        let steps = aside.map(|aside| table.at(aside / blur));
+        let waves = steps.map(|(step, _)| 2.0 * step - 1.0);
+        let slopes = steps.map(|(_, density)| 2.0 * density / blur);
+        let value = mean + half * waves[0] * waves[1] + by_x * place.x + by_y * place.y;
+        // Of the product with each line's distance.
+        let by_aside = [half * slopes[0] * waves[1], half * slopes[1] * waves[0]];
+        let by_place = -(self.normals[0] * by_aside[0] + self.normals[1] * by_aside[1]);
+        let by_blur = -(by_aside[0] * aside[0] + by_aside[1] * aside[1]) / blur;
+        let numbers = [
+            by_place.x,
+            by_place.y,
+            // A line that turns moves away from what lies along it.
+            -by_aside[0] * along[0],
+            -by_aside[1] * along[1],
+            by_blur,
+            1.0,
+            waves[0] * waves[1],
+            place.x,
+            place.y,
+        ];
+        (value, SVector::from(numbers))
+    }
+}
+
+/// What the pixels of a window say of a corner: the normal equations, of which only
+/// the lower triangle is filled, and the squares of what is left.
+pub struct Sums {
+    pub matrix: SMatrix<f64, NUMBERS, NUMBERS>,
+    pub side: SVector<f64, NUMBERS>,
+    pub squares: f64,
+}
+
+impl Corner {
+    pub fn sums(&self, table: &StepTable, samples: &[Sample]) -> Sums {
+        let model = Model::of(*self);
+        let mut sums = Sums { matrix: SMatrix::zeros(), side: SVector::zeros(), squares: 0.0 };
+        for sample in samples {
+            let (value, slopes) = model.at(table, sample.at);
+            let left = sample.value - value;
+            for column in 0..NUMBERS {
+                for row in column..NUMBERS {
+                    sums.matrix[(row, column)] += slopes[row] * slopes[column];
+                }
+            }
+            sums.side += slopes * left;
+            sums.squares += left * left;
+        }
+        sums
+    }
+
+    pub fn stepped(&self, step: &SVector<f64, NUMBERS>) -> Self {
+        let mut levels = self.levels;
+        levels.iter_mut().zip(step.iter().skip(5)).for_each(|(level, by)| *level += by);
+        Self {
+            at: self.at + Vector2::new(step[0], step[1]),
+            turns: [self.turns[0] + step[2], self.turns[1] + step[3]],
+            bends: self.bends,
+            blur: (self.blur + step[4]).clamp(*BLUR_PX.start(), *BLUR_PX.end()),
+            levels,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slopes_are_the_derivatives() {
+        let table = StepTable::default();
+        let corner = Corner {
+            at: Vector2::new(0.2, -0.1),
+            turns: [0.1, 1.4],
+            bends: [0.0, 0.0],
+            blur: 0.9,
+            levels: [120.0, -80.0, 0.5, -0.3],
+        };
+        for place in [Vector2::new(1.0, 0.4), Vector2::new(-0.7, 1.1), Vector2::new(0.1, -2.0)] {
+            let (_, slopes) = Model::of(corner).at(&table, place);
+            for number in 0..NUMBERS {
+                let mut step = SVector::<f64, NUMBERS>::zeros();
+                step[number] = 0.02;
+                let up = Model::of(corner.stepped(&step)).at(&table, place).0;
+                let down = Model::of(corner.stepped(&-step)).at(&table, place).0;
+                let by = (up - down) / 0.04;
+                // The table is good to some 1e-5 of the step.
+                assert!((by - slopes[number]).abs() < 0.3, "{number}: {by} {}", slopes[number]);
+            }
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! Normal equations solved: by a Cholesky factor, and with the numbers of one place
+//! eliminated (the Schur complement).
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix};
+
+use super::equations::{Equations, SHARED};
+
+/// Share of a number's standard deviation, the others being known, below which the
+/// pictures do not tell it from the others.
+const LEAST_APART: f64 = 1e-5;
+
+/// The equations of one place with its own numbers eliminated.
+#[derive(Debug, Clone)]
+pub struct Elimination {
+    /// What the picture says of the shared numbers, the place being free.
+    pub left: SMatrix<f64, SHARED, SHARED>,
+    /// What it says of the place, the shared numbers being known.
+    pub place: Factor,
+    /// How the place answers to the shared numbers, whitened.
+    pub follows: DMatrix<f64>,
+}
+
+impl Elimination {
+    /// `None` where the corners do not fix the place.
+    pub fn of(equations: &Equations) -> Option<Self> {
+        let place = Factor::of(&equations.place)?;
+        let follows = place.whiten(&equations.both);
+        let left = equations.shared - as_shared(&(follows.transpose() * &follows));
+        Some(Self { left, place, follows })
+    }
+}
+
+/// A matrix between shared numbers, of fixed size.
+fn as_shared(matrix: &DMatrix<f64>) -> SMatrix<f64, SHARED, SHARED> {
+    SMatrix::from_fn(|row, column| matrix[(row, column)])
+}
+
+/// A positive definite matrix M, as what makes xᵀM⁻¹x a sum of squares. Numbers
+/// whose row and column are 0 are known: they have no variance.
+#[derive(Debug, Clone)]
+pub struct Factor {
+    /// Scales the matrix to a diagonal of ones.
+    unit: DVector<f64>,
+    /// Cholesky factor of the scaled matrix.
+    lower: Cholesky<f64, Dyn>,
+}
+
+impl Factor {
+    /// `None` for a matrix that is not positive definite, or nearly so.
+    pub fn of(matrix: &DMatrix<f64>) -> Option<Self> {
+        let unit = matrix.diagonal().map(|on| if on == 0.0 { 0.0 } else { 1.0 / on.sqrt() });
+        let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, column| {
+            if row == column { 1.0 } else { matrix[(row, column)] * unit[row] * unit[column] }
+        });
+        let lower = Cholesky::new(scaled)?;
+        let apart = lower.l_dirty().diagonal().iter().all(|&on| on > LEAST_APART);
+        apart.then_some(Self { unit, lower })
+    }
+
+    /// The same for shared numbers.
+    pub fn of_shared(matrix: &SMatrix<f64, SHARED, SHARED>) -> Option<Self> {
+        Self::of(&DMatrix::from_fn(SHARED, SHARED, |row, column| matrix[(row, column)]))
+    }
+
+    /// Columns whose squares sum up to those of x in xᵀM⁻¹x.
+    pub fn whiten(&self, x: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut scaled = x.clone();
+        for (mut row, unit) in scaled.row_iter_mut().zip(&self.unit) {
+            row *= *unit;
+        }
+        self.lower.l_dirty().solve_lower_triangular_unchecked(&scaled)
+    }
+
+    /// M⁻¹x.
+    pub fn solve(&self, x: &DVector<f64>) -> DVector<f64> {
+        self.lower.solve(&x.component_mul(&self.unit)).component_mul(&self.unit)
+    }
+
+    /// Variances of the numbers, in units of the noise's variance.
+    pub fn variances(&self) -> DVector<f64> {
+        let whitened = self.whiten(&DMatrix::identity(self.unit.len(), self.unit.len()));
+        DVector::from_iterator(
+            self.unit.len(),
+            whitened.column_iter().map(|column| column.norm_squared()),
+        )
+    }
+}

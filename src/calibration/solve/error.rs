@@ -1,0 +1,48 @@
+//! Why no camera model is found.
+
+/// Pictures with a board below which the model cannot be told from the data:
+/// two poses fix the focal length only if nothing is wrong.
+pub const FEWEST_VIEWS: usize = 3;
+
+/// Reprojection error beyond which a fit is none \[px\].
+pub(super) const MOST_RMS_PX: f64 = 3.0;
+
+/// No camera model can be found.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// Too few pictures show the board.
+    #[error(
+        "{found} picture(s) show the board, at least {FEWEST_VIEWS} must: take 10 to 20, \
+         tilted to several sides, that fill the picture between them"
+    )]
+    TooFew {
+        /// Pictures that show it.
+        found: usize,
+    },
+    /// One of the pictures says nothing of where its board was.
+    #[error("{name}: the corners fit no board before a camera; leave the picture out")]
+    NoPose {
+        /// The picture's name.
+        name: String,
+    },
+    /// The corners are nowhere near where any camera would see them.
+    #[error(
+        "the corners are {rms_px:.1} px off where the best camera would see them, more than \
+         {MOST_RMS_PX} px: look for a wrong count of corners (--board), or pictures with another \
+         zoom or focus among them"
+    )]
+    NoFit {
+        /// Root mean square of the reprojection errors \[px\].
+        rms_px: f64,
+    },
+    /// The fit ended at something that is no camera.
+    #[error(
+        "the fit did not settle on a camera (focal lengths {} and {} px): \
+         tilt the board more, and check that it is flat and counted right",
+        focal_px[0], focal_px[1]
+    )]
+    NoCamera {
+        /// The focal lengths it ended at \[px\].
+        focal_px: [f64; 2],
+    },
+}

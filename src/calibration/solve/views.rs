@@ -1,0 +1,86 @@
+//! What a camera is fitted to: the corners of each picture, and a guess to begin with.
+
+use super::error::{FEWEST_VIEWS, SolveError};
+use crate::calibration::board::Board;
+use crate::calibration::bundle::{Fit, Guess};
+use crate::calibration::equations::Equations;
+use crate::calibration::equations::{Corner, Free, Model, Place, SHARED, only};
+use crate::calibration::factor::{Elimination, Factor};
+use crate::calibration::homography;
+use crate::calibration::sighting::Sighting;
+use crate::numeric::number::float;
+
+/// What is fitted to, and where it begins.
+#[derive(Debug)]
+pub struct Views {
+    /// The corners of the one board of each picture.
+    pub boards: Vec<Vec<Vec<Corner>>>,
+    /// A camera and places that are roughly right.
+    pub start: Guess,
+    /// Size of the pictures \[px\].
+    pub size: [u32; 2],
+}
+
+impl Views {
+    /// Of sightings that are all of one size.
+    pub fn of(board: &Board, sightings: &[Sighting]) -> Result<Self, SolveError> {
+        let Some(first) = sightings.first().filter(|_| sightings.len() >= FEWEST_VIEWS) else {
+            return Err(SolveError::TooFew { found: sightings.len() });
+        };
+        let size = first.image_size_px;
+        let boards: Vec<_> = sightings.iter().map(|s| vec![board.place(&s.corners)]).collect();
+        let maps: Vec<_> = boards
+            .iter()
+            .filter_map(|b| homography::homography(&homography::pairs(&b[0])))
+            .collect();
+        let camera = homography::pinhole(&maps, size);
+        let places = sightings
+            .iter()
+            .zip(&boards)
+            .map(|(sighting, corners)| {
+                homography::pose_before(&camera, &corners[0])
+                    .map(Place::of_one)
+                    .ok_or_else(|| SolveError::NoPose { name: sighting.name.clone() })
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Self {
+            boards,
+            start: Guess { model: Model { camera, bend_mm: [0.0; 2] }, places },
+            size,
+        })
+    }
+
+    /// Number of corners in all pictures.
+    pub fn corners(&self) -> usize {
+        self.boards.iter().flatten().map(Vec::len).sum()
+    }
+
+    /// Variance of a corner's place in one direction \[px²\], from what the fit
+    /// leaves; not a number where there are too few corners to tell.
+    #[expect(clippy::cast_precision_loss, reason = "counts of corners and pictures")]
+    pub fn noise_variance_px2(&self, fit: &Fit, free: Free) -> f64 {
+        let numbers = free.count() + fit.places.iter().map(Place::numbers).sum::<usize>();
+        let left = (2 * self.corners()) as f64 - numbers as f64;
+        if left > 0.0 { fit.squares_px2 / left } else { f64::NAN }
+    }
+
+    /// Standard deviations of the shared numbers for a noise of 1 px.
+    pub fn spreads(&self, fit: &Fit, free: Free) -> Option<[f64; SHARED]> {
+        let mut left = nalgebra::SMatrix::<f64, SHARED, SHARED>::zeros();
+        for (place, boards) in fit.places.iter().zip(&self.boards) {
+            left += Elimination::of(&Equations::of(&fit.model, free, place, boards)?)?.left;
+        }
+        let variances = Factor::of_shared(&only(left, free))?.variances();
+        Some(std::array::from_fn(|number| variances[number].sqrt()))
+    }
+
+    /// Root mean square distance of all corners for a sum of squares \[px\].
+    pub fn rms_px(&self, squares_px2: f64) -> f64 {
+        root_mean_square(squares_px2, self.corners())
+    }
+}
+
+/// Root of the mean of so many squares.
+pub fn root_mean_square(squares: f64, count: usize) -> f64 {
+    (squares / float(count.max(1))).sqrt()
+}

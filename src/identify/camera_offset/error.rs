@@ -1,0 +1,103 @@
+//! Why a bead does not tell the offset.
+
+use crate::core::units::{Mm, MmPerS};
+
+/// Widths below which nothing is told.
+pub const FEWEST: usize = 50;
+/// Gauges of path, side by side, below which the noise is not told from the bead.
+pub const FEWEST_PIECES: usize = 10;
+
+/// Why a bead does not tell the offset.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum OffsetError {
+    /// Nothing says where the nozzle was.
+    #[error(
+        "no robot state with a path that grew in PRINT or HOLD: the offset shows only while bead \
+         is laid"
+    )]
+    NoPath,
+    /// Too few widths.
+    #[error(
+        "{found} widths are of bead that was laid while the speed is known, and {FEWEST} are needed: \
+         record longer, or see why frames were refused (`truebead process`)"
+    )]
+    TooFew {
+        /// Widths that could be used.
+        found: usize,
+    },
+    /// Too little path.
+    #[error(
+        "the widths cover only {pieces} gauges side by side, of {:.1} mm each, and {FEWEST_PIECES} are \
+         needed: record a longer bead", gauge.get()
+    )]
+    TooShort {
+        /// Length of the gauge.
+        gauge: Mm,
+        /// How many gauges of path were measured.
+        pieces: usize,
+    },
+    /// The speed hardly changed.
+    #[error(
+        "the speed changed by {:.1} % only ({:.1} to {:.1} mm/s), which shows in no width: run once \
+         with steps of the target width, or of the speed, by 20 % or more",
+        100.0 * (to.get() / from.get() - 1.0), from.get(), to.get()
+    )]
+    Steady {
+        /// Slowest speed.
+        from: MmPerS,
+        /// Fastest speed.
+        to: MmPerS,
+    },
+    /// The widths do not show it.
+    #[error(
+        "the speed changed by {:.1} % ({:.1} to {:.1} mm/s), but the widths do not follow it \
+         clearly, at no offset up to {farthest}: run once with larger or more abrupt steps of the \
+         target width or of the speed",
+        100.0 * (to.get() / from.get() - 1.0), from.get(), to.get()
+    )]
+    NotFollowing {
+        /// Slowest speed.
+        from: MmPerS,
+        /// Fastest speed.
+        to: MmPerS,
+        /// Largest offset that was tried.
+        farthest: Mm,
+    },
+    /// The best is at an end of what was tried.
+    #[error(
+        "the widths fit best at the end of what was tried, {at:.1} of 0 to {farthest}: give more with \
+         --max-mm if the camera is further away; otherwise the widths follow something else than \
+         the speed",
+        at = .at.get()
+    )]
+    AtEnd {
+        /// The best that was tried.
+        at: Mm,
+        /// Largest offset that was tried.
+        farthest: Mm,
+    },
+    /// Two offsets are as good.
+    #[error(
+        "{:.1} mm and {:.1} mm fit about as well, as with a speed that repeats itself: run once \
+         with steps at uneven distances, or give a --max-mm between the two",
+        first.get(), second.get()
+    )]
+    Ambiguous {
+        /// The best.
+        first: Mm,
+        /// Another one.
+        second: Mm,
+    },
+    /// Known no better than itself.
+    #[error(
+        "{:.1} ± {:.1} mm is no answer: run once with larger or more abrupt steps of the target \
+         width or of the speed",
+        offset.get(), sigma.get()
+    )]
+    Loose {
+        /// The best.
+        offset: Mm,
+        /// Its standard deviation.
+        sigma: Mm,
+    },
+}

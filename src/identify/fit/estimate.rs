@@ -1,0 +1,131 @@
+//! A model that was estimated, and what it says of other data.
+
+use nalgebra::DMatrix;
+
+use super::error::FitError;
+use super::linear::nearest;
+use super::loose::Loose;
+use super::problem::free_responses;
+use super::quality::Quality;
+use super::samples::{Samples, SamplesError};
+use super::settings::{Before, Settings};
+use crate::numeric::lti::{Simulator, TransferFunction};
+
+/// A parameter that was estimated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    /// Its name, as [`Structure`] gives it; further `dead_time_s`,
+    /// `output_level`.
+    pub name: String,
+    /// Estimate, in seconds where the name ends so, else in units of the data and
+    /// of 1/s.
+    pub value: f64,
+    /// Standard error that allows for the colour of the residuals.
+    pub sigma: f64,
+    /// Standard error if the residuals were white. Where they are, both agree.
+    pub sigma_if_white: f64,
+}
+
+/// What a user should know of a fit that stands.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Note {
+    /// The estimate of the dead time was its lower end of 0: it was taken out.
+    /// Where the fit is poor beside, the output may run ahead of the input.
+    NoDeadTime,
+    /// With as many zeros as poles and a held input the dead time can be told to a
+    /// whole step only; it has no standard error.
+    DeadTimeToAStep {
+        /// That whole number of steps \[s\].
+        dead_time_s: f64,
+    },
+    /// The data do not determine all parameters
+    /// ([`Settings::accept_undetermined`]).
+    Undetermined(Loose),
+    /// The oscillating form came out with a damping above 1: its poles are real.
+    PolesAreReal,
+}
+
+/// A model with what is known of it.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// What was asked for; without dead time where [`Note::NoDeadTime`] says so.
+    pub settings: Settings,
+    /// Output less output level over input less input level.
+    pub model: TransferFunction,
+    /// Where the input stood before, in units of the input.
+    pub input_level: f64,
+    /// The output for an input that stands at the input level.
+    pub output_level: f64,
+    /// Parameters with their errors.
+    pub parameters: Vec<Parameter>,
+    /// Covariance of the parameters, in their order, with the residuals' colour.
+    pub covariance: DMatrix<f64>,
+    /// The same if the residuals were white.
+    pub covariance_if_white: DMatrix<f64>,
+    /// What the model says that the output was.
+    pub predicted: Vec<f64>,
+    /// Output less prediction.
+    pub residuals: Vec<f64>,
+    /// Standard deviation of the residuals, in units of the output.
+    pub residual_sigma: f64,
+    /// On the data of the estimation.
+    pub quality: Quality,
+    /// Akaike's criterion for white residuals; less is better.
+    pub aic: f64,
+    /// Schwarz's criterion for white residuals; less is better.
+    pub bic: f64,
+    /// Number of samples that would say as much if they were independent.
+    pub independent_samples: f64,
+    /// What a user should know.
+    pub notes: Vec<Note>,
+    /// Number of estimated parameters, those of the free response included.
+    pub estimated: usize,
+}
+
+impl Fit {
+    /// A parameter of this name.
+    pub fn parameter(&self, name: &str) -> Option<&Parameter> {
+        self.parameters.iter().find(|parameter| parameter.name == name)
+    }
+
+    /// Whether all parameters are determined.
+    pub fn is_determined(&self) -> bool {
+        !self.notes.iter().any(|note| matches!(note, Note::Undetermined(_)))
+    }
+
+    /// What the model says of other data, with the fit's levels. With
+    /// [`Before::Unknown`] the free response, and nothing else, is estimated from
+    /// them.
+    pub fn predict(&self, samples: &Samples, before: Before) -> Result<Vec<f64>, FitError> {
+        let first = samples.input().first().copied().unwrap_or(self.input_level);
+        let stood = match before {
+            Before::Settled { input } => input,
+            Before::SettledAtFirst | Before::Unknown => first,
+        };
+        let mut model = Simulator::new(&self.model, samples.dt_s(), self.settings.between)?;
+        model.settle(stood - self.input_level)?;
+        let answer = |u: &f64| self.output_level + model.step(u - self.input_level);
+        let mut predicted: Vec<f64> = samples.input().iter().map(answer).collect();
+        if before == Before::Unknown {
+            self.add_free_response(samples, &mut predicted)?;
+        }
+        Ok(predicted)
+    }
+
+    fn add_free_response(&self, samples: &Samples, predicted: &mut [f64]) -> Result<(), FitError> {
+        let columns = free_responses(self.model.den(), samples.dt_s(), samples.len())?;
+        let left: Vec<f64> = samples.output().iter().zip(&*predicted).map(|(y, p)| y - p).collect();
+        let found = nearest(&columns, &left).ok_or(FitError::NoStart)?;
+        for (value, column) in found.iter().zip(&columns) {
+            predicted.iter_mut().zip(column).for_each(|(y, c)| *y += value * c);
+        }
+        Ok(())
+    }
+
+    /// How well the model predicts other data.
+    pub fn validate(&self, samples: &Samples, before: Before) -> Result<Quality, FitError> {
+        let predicted = self.predict(samples, before)?;
+        let found = Quality::of(samples.output(), &predicted);
+        found.ok_or(FitError::Data(SamplesError::TooFew { found: 0, needed: 1 }))
+    }
+}
