@@ -1,6 +1,7 @@
 //! What a numerical library would hold: statistics, filters, linear systems, fits.
 
 pub mod blurred_step;
+pub mod gauss_legendre;
 pub mod hampel;
 pub mod lti;
 pub mod normal_distribution;

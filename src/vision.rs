@@ -53,6 +53,7 @@ pub mod gauge;
 mod ground;
 mod light;
 mod line;
+mod located;
 mod mean_edge;
 mod measure;
 mod motion;

@@ -13,12 +13,17 @@ mod curved;
 mod flank;
 mod groove;
 mod linear;
+mod look;
 mod shape;
 mod skew;
 mod slopes;
+mod step;
+mod step_fit;
 
-pub use shape::{Extent, Look, Shading, Shape, Step};
+pub use look::Look;
+pub use shape::{Shading, Shape};
 pub use skew::EdgeSkew;
+pub use step::{Extent, Step};
 
 /// Rows that are laid over each other at most.
 const ROWS: usize = 100;

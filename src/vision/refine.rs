@@ -5,9 +5,9 @@
 
 use super::blur::Overlay;
 use super::fit::{Edge, EdgeFit, Prior, Window};
+use super::located::Located;
 use super::pool;
 use super::strip::{Grey, Strip};
-use super::trace::Located;
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::rank;
 

@@ -15,22 +15,23 @@
 
 mod crossing;
 mod groove;
+mod kernel;
 mod levels;
 mod noise;
 mod route;
+mod scene;
 mod window;
 
 use super::coarse::StepLine;
-use super::gauge::EdgeKind;
-use super::strip::{Grey, Strip};
-use super::trace::{self, Located};
-use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::{float, narrow, whole};
+use super::located::{self, Located};
+use super::strip::Grey;
+use crate::numeric::number::{float, narrow};
 use crossing::INSIDE_PX;
 pub use groove::Blur;
 use groove::EdgeShape;
 use levels::{Crossings, Levels, OUTSIDE};
 use route::Route;
+pub use scene::Scene;
 use window::{ALONG_PX, STRAIGHT_ROWS, Windows};
 
 /// Rounds in which levels are read along the edge that was found with the levels
@@ -81,27 +82,6 @@ const SHIFT_FRACTION: f64 = 0.2;
 /// How far off the shape may lie then, in what such a difference makes of the pixels that are
 /// summed within the edge: a flank that is no blurred step lies farther.
 const MOST_OFF: f64 = 2.0;
-
-/// What is looked at.
-#[derive(Debug, Clone, Copy)]
-pub struct Scene<'a, T> {
-    /// The gauge's pixels.
-    pub strip: &'a Strip<'a, T>,
-    /// Its caliper lines: first row and the row after the last of each.
-    pub lines: &'a [(usize, usize)],
-    /// Standard deviation of a pixel's noise \[grey levels\].
-    pub noise: f32,
-    /// Distance of the two edges \[px\].
-    pub width_px: f32,
-    /// Whether the bead lies after the edge.
-    pub bead_after: bool,
-    /// Whether the bead is brighter than what lies outside.
-    pub bright: bool,
-    /// What the edge looks like.
-    pub edge: EdgeKind,
-    /// A step that the lens blurs.
-    pub table: &'a StepTable,
-}
 
 /// Finds one edge; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
@@ -155,7 +135,7 @@ impl RoughEdge {
 
     /// Mean of the positions across the bead \[px\].
     pub fn middle(&self) -> f64 {
-        trace::middle(&self.lines)
+        located::middle(&self.lines)
     }
 
     /// Finds the edge near a line; `None` where no edge runs there.
@@ -309,13 +289,4 @@ impl RoughEdge {
             self.lines.push(located);
         }
     }
-}
-
-/// The Gaussian kernel of a standard deviation \[samples\], normalised, from its
-/// middle outwards; three standard deviations long.
-fn kernel(sigma: f64) -> Vec<f32> {
-    let half = whole(narrow(3.0 * sigma)).max(1);
-    let value = |k: usize| libm::exp(-0.5 * (float(k) / sigma).powi(2));
-    let sum = 2.0 * (0..=half).map(value).sum::<f64>() - value(0);
-    (0..=half).map(|k| narrow(value(k) / sum)).collect()
 }

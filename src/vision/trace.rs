@@ -3,7 +3,9 @@
 //! held against it, and the rows of a band are solved for place and levels
 //! together.
 
+mod band_sums;
 mod bands;
+mod group;
 mod hidden;
 mod levels;
 mod rows;
@@ -12,6 +14,7 @@ mod winding;
 
 use super::cut_off::CutOff;
 use super::light::Surroundings;
+use super::located::{self, Located};
 use super::overlay::{EdgeSkew, Extent, Look, Overlay, REACH, Shape, Step};
 use super::path::{self, Course};
 use super::pool::{self, Bands};
@@ -25,6 +28,8 @@ use super::texture::Texture;
 use super::whiten::Whitener;
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::{float, narrow};
+use band_sums::BandSums;
+use group::Group;
 
 /// Passes over the rows at most; a second one is made only where the first
 /// path was off by a good part of the blur.
@@ -44,19 +49,6 @@ const COVERED_SHARE: f64 = 0.03;
 /// Misfit of the clear rows from which on the edge is not covered, but no blurred
 /// step at all.
 const CLEAR_FIT: f64 = 1.25;
-
-/// A caliper's edge with sub-pixel position.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Located {
-    /// Position across the bead at the middle of the band \[px\].
-    pub at: f64,
-    /// Variance of the position \[px²\].
-    pub variance: f64,
-    /// Signed height of the step \[grey levels\].
-    pub height: f64,
-    /// Share of the band's rows that it comes from.
-    pub share: f64,
-}
 
 /// What is looked at.
 #[derive(Debug, Clone, Copy)]
@@ -106,7 +98,7 @@ pub struct Tracer {
     /// How far bands lie off the line between their neighbours; more than 1 where the
     /// edge winds between them.
     winding: f32,
-    groups: Vec<rows::Group>,
+    groups: Vec<Group>,
     sheet: Sheet,
     overlay: Overlay,
     seen: Option<Look>,
@@ -119,7 +111,7 @@ pub struct Tracer {
     template: Template,
     plain: Vec<PlainSums>,
     sorted: Vec<f32>,
-    solved: Vec<bands::BandSums>,
+    solved: Vec<BandSums>,
     memory: Vec<[f32; 3]>,
     scatter: Vec<f64>,
     edges: Vec<Option<Located>>,
@@ -194,7 +186,7 @@ impl Tracer {
 
     /// Mean of the edges' places across the bead \[px\].
     pub fn middle(&self) -> f64 {
-        middle(&self.edges)
+        located::middle(&self.edges)
     }
 
     /// The edges, for those who sort out outliers.
@@ -531,12 +523,6 @@ impl Tracer {
         self.course.redraw(scene.lines, &self.rough, &mut self.memory);
         self.read(scene);
     }
-}
-
-/// Mean of places across the bead \[px\].
-pub fn middle(places: &[Option<Located>]) -> f64 {
-    let sum: f64 = places.iter().flatten().map(|place| place.at).sum();
-    sum / float(places.iter().flatten().count().max(1))
 }
 
 fn typical(values: &[f32]) -> f32 {

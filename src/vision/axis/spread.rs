@@ -1,11 +1,11 @@
 //! How sure a width is, and how rough the bead.
 
+use super::scene::{Memory, Scene, Side};
 use super::sections::Sections;
-use super::{Memory, Scene, Side};
 use crate::numeric::number::float;
 use crate::vision::curve::Curve;
+use crate::vision::located::Located;
 use crate::vision::scatter;
-use crate::vision::trace::Located;
 use crate::vision::waviness::{CURVED, Evidence, Midline, ORDERS, Waves, legendre, norm};
 
 /// Share of the rows from which on nothing but the bead itself is seen.

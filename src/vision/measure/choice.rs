@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 
 use super::judge::{STRANGE, WIDEST_BLUR_PX, WIDEST_MOTION_PX};
 use super::rough::WIDEST_ROUGH_PX;
-use super::{Way, Work};
+use super::work::{Way, Work};
 use crate::vision::reject::Reject;
 use crate::vision::rough::RoughFit;
 use crate::vision::trace::Tracer;

@@ -1,7 +1,8 @@
 //! What is not believed: edges that disagree with themselves or with each other,
 //! and steps that are too low.
 
-use super::{Way, Work};
+use super::pattern_limits::{STRONGEST_OF_LINES, STRONGEST_PATTERN};
+use super::work::{Way, Work};
 use crate::numeric::number::float;
 use crate::numeric::rank;
 use crate::vision::gauge::EdgeKind;
@@ -46,12 +47,6 @@ pub(super) const WHOLE_SHARE: f64 = 0.95;
 /// The same where one edge was hidden and had to be located line by line.
 const LOST_SCATTER_PX: f64 = 0.5;
 
-/// Strongest pattern beside the bead, as a share of the contrast: a pattern of a third
-/// is measured, of a stronger one parts are taken for the bead.
-const STRONGEST_PATTERN: f64 = 0.37;
-/// The same where edges were located line by line: drawn widths beside a pattern of 0.25 and
-/// 0.31 were 53 and 22 px off. A real strand has up to 0.2, real printed lines up to 0.24.
-const STRONGEST_OF_LINES: f64 = 0.25;
 /// Share of a pattern beside an edge that counts for its place: at the edge it is half
 /// covered by the bead, and the widths of drawn beads tell a little less.
 const PATTERN_SHARE: f64 = 0.46;

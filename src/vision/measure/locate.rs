@@ -3,7 +3,7 @@
 
 use super::judge::is_strange;
 use super::search::Found;
-use super::{NEED_SHARE, OFF_PX, Way, Work};
+use super::work::{NEED_SHARE, OFF_PX, Way, Work};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::narrow;
 use crate::numeric::rank;

@@ -1,9 +1,12 @@
 //! Beads that have a texture, or lie on ground that has a pattern.
 
 use super::choice::has_grains;
+use super::even;
 use super::judge::{WHOLE_SHARE, place};
-use super::rough::in_texture;
-use super::{NEED_SHARE, Work, even};
+use super::pattern_limits::{
+    STRONGEST_BESIDE_WHOLE, STRONGEST_PATTERN, check_pattern, doubt_of_blur, in_texture,
+};
+use super::work::{NEED_SHARE, Work};
 use crate::calibration::SurfaceMap;
 use crate::numeric::number::float;
 use crate::vision::coarse::{LinePair, StepLine};
@@ -15,17 +18,6 @@ use crate::vision::strip::{Grey, Strip, View};
 use crate::vision::trace::Tracer;
 use crate::vision::width::WidthMeasurement;
 
-/// Strongest pattern of the ground, as a fraction of the contrast: one of a third is
-/// measured, of a stronger one parts are taken for the bead.
-const STRONGEST: f64 = 0.37;
-/// The same where no mean profile tells the edges. Beside beads of real concrete, which
-/// have a texture themselves, other beads and grooves have up to 0.464; a pattern beside a
-/// plain bead is none of those.
-const STRONGEST_OF_SAME: f64 = 0.48;
-const STRONGEST_BESIDE_PLAIN: f64 = 0.2;
-/// The same where the blurred steps of a plain bead show all along it: beside drawn patterns
-/// of more, one in fifty was off by five standard deviations. A real strand has up to 0.2.
-pub(super) const STRONGEST_BESIDE_WHOLE: f64 = 0.25;
 /// Weakest pattern, as a fraction of the contrast, beside which blurred steps are not
 /// good enough: one of less draws them outwards by hardly 0.02 px.
 const NOTABLE: f64 = 0.06;
@@ -37,11 +29,6 @@ const ALIKE: f64 = 0.4;
 const HALF_WAY: f32 = 0.5;
 /// Blur beyond which a bead's texture is free of a flank that is not known yet \[px\].
 const LARGE_BLUR_PX: f64 = 3.0;
-/// Blur of a mean profile up to which its variance is what texture and pattern leave open
-/// \[px\]. Drawn beads with a blur of 1.5 px and texture on them had more in one of three frames,
-/// and the more, the more they were off: a z of 1.15, 1.3 and 1.4 where 2, 2.5 and 3 px fitted
-/// best, for places where the bead is dark pass for a flank.
-const SURE_BLUR_PX: f64 = 1.5;
 /// Variance of the ground along the bead in that of the noise from which on it has a
 /// pattern: less is not told from noise.
 const TOLD: f64 = 1.25;
@@ -229,8 +216,8 @@ impl Work {
         let one = left.locate(&scenes[0], self.blur_shapes.lens(), blur_px).ok_or(failed)?;
         let other = right.locate(&scenes[1], self.blur_shapes.lens(), blur_px).ok_or(failed)?;
         let got = pattern / one.contrast.min(other.contrast);
-        if got > STRONGEST {
-            return Err(Reject::Patterned { got, limit: STRONGEST });
+        if got > STRONGEST_PATTERN {
+            return Err(Reject::Patterned { got, limit: STRONGEST_PATTERN });
         }
         let ground = one.samples[0].with(other.samples[0]).variance();
         let bead = one.samples[1].with(other.samples[1]).variance();
@@ -238,7 +225,7 @@ impl Work {
             return Err(failed);
         }
         // An edge beside a strong pattern is drawn to its bright places.
-        let beside = ground * (1.0 + (got / STRONGEST).powi(4)) + bead;
+        let beside = ground * (1.0 + (got / STRONGEST_PATTERN).powi(4)) + bead;
         // A flank's slope falls with its blur, and what a texture moves an edge by grows with it.
         let doubt = doubt_of_blur(blur_px);
         let variance = beside * if pattern > 0.0 { doubt } else { doubt * doubt };
@@ -264,18 +251,6 @@ fn rms([left, right]: [f64; 2]) -> f64 {
 /// pattern.
 fn are_alike([left, right]: [f64; 2]) -> bool {
     left.min(right) >= ALIKE * left.max(right)
-}
-
-/// Refuses a bead whose ground has a pattern, a fraction of the contrast, and whose mean
-/// profile tells no edges: parts of the pattern look like bead, and like grooves.
-pub(super) fn check_pattern(got: f64, is_textured: bool) -> Result<(), Reject> {
-    let limit = if is_textured { STRONGEST_OF_SAME } else { STRONGEST_BESIDE_PLAIN };
-    if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
-}
-
-/// By how much the variance of an edge of a textured bead grows with its blur.
-pub(super) fn doubt_of_blur(blur_px: f64) -> f64 {
-    (blur_px / SURE_BLUR_PX).max(1.0)
 }
 
 /// Where an edge lies on all caliper lines: where it is not located, between those beside it.

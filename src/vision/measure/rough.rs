@@ -1,7 +1,8 @@
 //! Beads whose edges are no blurred steps: torn ones, grooves, texture.
 
-use super::patterned::{check_pattern, doubt_of_blur};
-use super::{NEED_SHARE, Work, even};
+use super::even;
+use super::pattern_limits::{check_pattern, in_texture};
+use super::work::{NEED_SHARE, Work};
 use crate::calibration::SurfaceMap;
 use crate::numeric::number::{float, narrow};
 use crate::vision::coarse::{LinePair, StepLine};
@@ -225,15 +226,6 @@ impl Work {
 fn with_flank(fit: RoughFit) -> RoughFit {
     let off_px = OFF_PER_BLUR * (fit.blur_px - WHOLE_FLANK_PX).max(0.0);
     RoughFit { variance: fit.variance + off_px * off_px, ..fit }
-}
-
-/// Edges of a textured bead whose mean profile shows none: without a groove beside it, dark
-/// places of the bead pass for a part of a flank that is too wide.
-pub(super) fn in_texture(pair: &LinePair, fits: [RoughFit; 2]) -> [RoughFit; 2] {
-    if pair.has_groove() {
-        return fits;
-    }
-    fits.map(|fit| RoughFit { variance: fit.variance * doubt_of_blur(fit.blur_px), ..fit })
 }
 
 /// Whether a frame was refused for what hides its edges, which may be grains.

@@ -1,7 +1,7 @@
 //! The search for the bead: candidates, contours, and the pair of them that is
 //! the bead's two edges.
 
-use super::{NEED_SHARE, Work};
+use super::work::{NEED_SHARE, Work};
 use crate::calibration::SurfaceMap;
 use crate::vision::contour::Contours;
 use crate::vision::edge::{Candidates, REACH, respond};

@@ -3,7 +3,8 @@
 //! beside a bead.
 
 use super::Overlay;
-use super::shape::{Beside, Flanks, Shading, Step};
+use super::shape::{Beside, Shading};
+use super::step::{Flanks, Step};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::normal_equations::Normal;
 

@@ -1,8 +1,7 @@
 //! How steeply the overlay runs, place by place: where the edge is steepest,
 //! and whether another step lies beside it.
 
-use super::flank::Flank;
-use super::shape::{Extent, Step};
+use super::step::{Extent, Flank, Step};
 use super::{Overlay, PHASES, REACH, SPAN};
 
 /// Distance from the path within which the edge lies \[px\].

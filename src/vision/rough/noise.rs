@@ -1,8 +1,8 @@
 //! How far pixel noise and texture move the mean position of an edge.
 
-use super::Scene;
 use super::crossing::INSIDE_PX;
 use super::levels::{Crossings, DEPTH_SIGMA, LENGTH, Levels, OUTSIDE, Profile};
+use super::scene::Scene;
 use super::window::Windows;
 use crate::numeric::number::whole;
 use crate::numeric::number::{float, narrow};

@@ -1,7 +1,8 @@
 //! Rows about an edge, turned so that the bead lies at higher positions and is
 //! the brighter side, and smoothed.
 
-use super::{Scene, kernel};
+use super::kernel;
+use super::scene::Scene;
 use crate::numeric::number::{float, narrow};
 use crate::vision::coarse::StepLine;
 use crate::vision::sheet::{SPAN, Sheet};
@@ -104,7 +105,8 @@ impl Windows {
         let together = if strip.along > MANY_ROWS { 2 } else { 1 };
         if self.together != together {
             self.together = together;
-            self.kernels = [kernel(ACROSS_PX), kernel(ALONG_PX / float(together))];
+            self.kernels =
+                [kernel::gaussian(ACROSS_PX), kernel::gaussian(ALONG_PX / float(together))];
         }
         let at = |v: f32| [line.at + line.slope * (v - middle), 0.0, 1.0];
         // Caliper lines of an odd number of rows would leave single ones over.

@@ -1,10 +1,11 @@
 //! An edge one side of which passes the end of the camera's scale.
 
-use super::{Extent, Located, MAX_PASSES, NEAR_ENOUGH, Scene, State, Step, Tracer, typical};
+use super::{Extent, MAX_PASSES, NEAR_ENOUGH, Scene, State, Step, Tracer, typical};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::narrow;
 use crate::numeric::rank;
 use crate::vision::cut_off;
+use crate::vision::located::Located;
 use crate::vision::path;
 use crate::vision::pool;
 use crate::vision::strip::Grey;

@@ -3,7 +3,8 @@
 
 use nalgebra::Matrix3;
 
-use super::bands::BandSums;
+use super::band_sums::BandSums;
+use super::group::Group;
 use super::{MANY_SIGMA, Scene, Tracer};
 use crate::numeric::number::{float, narrow};
 use crate::numeric::rank;
@@ -20,24 +21,6 @@ const FEW_WILD: f32 = 2.0;
 /// By how much the squares that a row leaves exceed what may be noise, where it
 /// is covered for certain.
 const UNFIT: f32 = 1.5;
-
-/// A few rows that are held against the edge together.
-#[derive(Debug, Clone, Copy)]
-pub struct Group {
-    /// The band that they belong to.
-    pub band: usize,
-    /// Number of rows.
-    pub weight: f32,
-    /// How far the rows were sampled beyond the path \[px\].
-    pub ahead: f32,
-    /// What they say.
-    pub sums: RowSums,
-    /// Place of the edge beside the path \[px\].
-    pub moved: f32,
-    /// Sum of the squares of what does not fit, as if of a single row
-    /// \[grey levels²\].
-    pub misfit: f32,
-}
 
 impl Tracer {
     /// Holds every window against the edge.
@@ -189,14 +172,6 @@ impl Tracer {
         sums.before = (sums.before.0 * weight, sums.before.1 * weight);
         sums.after = (sums.after.0 * weight, sums.after.1 * weight);
         sums
-    }
-}
-
-impl Group {
-    /// Rows that are not to be held.
-    fn hidden(band: usize, weight: f32) -> Self {
-        let (ahead, moved, misfit) = (0.0, 0.0, f32::INFINITY);
-        Self { band, weight, ahead, sums: RowSums::default(), moved, misfit }
     }
 }
 
