@@ -20,7 +20,7 @@ use truebead::core::time::Stamp;
 use truebead::core::units::Mm;
 use truebead::scenario::image::Picture;
 use truebead::sim::render::Renderer;
-use truebead::vision::{Axis, Gauge, Measurer, Method, Polarity};
+use truebead::vision::{Axis, Gauge, Measurer, Method, Polarity, WidthRange};
 
 const MM_PER_PX: f64 = 0.126_582;
 /// Frames of the ring, 25 MB.
@@ -49,7 +49,7 @@ fn gauge(axis: Axis, method: Method) -> Gauge {
             Roi { x: 40, y: 20, width: 640, height: 500 },
             axis,
             Polarity::Bright,
-            (Mm::constant(20.0), Mm::constant(60.0)),
+            WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
         )
     }
 }

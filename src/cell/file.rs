@@ -161,7 +161,7 @@ impl Cell {
             start_speed: run.robot.start_speed,
             share,
             reach: run.camera.offset + self.gauge_length(calibration) * 0.5,
-            width_range: self.gauge.width_range,
+            width_range: (self.gauge.width_range.min, self.gauge.width_range.max),
         })
     }
 }
@@ -184,7 +184,8 @@ fn read_cell(root: &Table<'_>, folder: &Path) -> Option<Cell> {
     let target =
         control_table.as_ref().and_then(|t| control::read_course(t, layers.as_ref(), width));
     if let (Some(table), Some(target), Some(gauge)) = (&control_table, &target, &gauge) {
-        control::check_target(table, layers.as_ref(), target, gauge.width_range);
+        let range = (gauge.width_range.min, gauge.width_range.max);
+        control::check_target(table, layers.as_ref(), target, range);
     }
     let control = control_table.as_ref().and_then(|t| control::read_control(t, target.clone()));
     let camera_table = root.run_table("camera");

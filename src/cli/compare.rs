@@ -14,6 +14,7 @@ use crate::io::progress::Progress;
 use crate::report::compare::Comparison;
 use crate::rows::output;
 use crate::sim::compare::{Contender, Figures};
+use crate::vision::WidthRange;
 
 /// Most controllers: as many as there are colours.
 const MOST: usize = 6;
@@ -150,7 +151,7 @@ fn widths(args: &CompareArgs, contenders: &[Contender]) -> anyhow::Result<Vec<Mm
         WrongArguments::new(what)
     })?;
     for who in contenders {
-        let (low, high) = who.cell.gauge.width_range;
+        let WidthRange { min: low, max: high } = who.cell.gauge.width_range;
         if let Some(width) = widths.iter().find(|width| **width < low || **width > high) {
             let what = format!(
                 "--widths: found {width}, expected {low} to {high}, which is the width_range_mm of {}",

@@ -21,7 +21,7 @@ use crate::report::run::RunPage;
 use crate::rows::frame_row::{ControlColumns, FrameRow, sample};
 use crate::rows::log::{ControlFacts, LogOptions};
 use crate::rows::summary::{Note, Summary};
-use crate::vision::{Axis, Edges, Gauge, Polarity, WidthMeasurement};
+use crate::vision::{Axis, Edges, Gauge, Polarity, WidthMeasurement, WidthRange};
 use crate::width_control::limiter::Limit;
 use crate::width_control::limiter::Limits;
 
@@ -34,7 +34,7 @@ pub fn gauge() -> Gauge {
         Roi { x: 100, y: 60, width: 520, height: 420 },
         Axis::Vertical,
         Polarity::Bright,
-        (Mm::constant(20.0), Mm::constant(60.0)),
+        WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
     )
 }
 

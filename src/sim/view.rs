@@ -115,14 +115,14 @@ pub struct Place {
 mod tests {
     use super::*;
     use crate::core::units::Mm;
-    use crate::vision::Polarity;
+    use crate::vision::{Polarity, WidthRange};
 
     fn gauge(axis: Axis) -> Gauge {
         Gauge::new(
             Roi { x: 10, y: 20, width: 101, height: 51 },
             axis,
             Polarity::Bright,
-            (Mm::ZERO, Mm::constant(50.0)),
+            WidthRange { min: Mm::ZERO, max: Mm::constant(50.0) },
         )
     }
 

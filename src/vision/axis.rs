@@ -2,9 +2,9 @@
 //! along the gauge is taken to the surface, and widths are taken there normal
 //! to the line midway between the two, which is the bead's local axis.
 
-mod scene;
 mod sections;
 mod spread;
+mod width_input;
 
 use crate::core::units::Mm;
 
@@ -13,9 +13,9 @@ use super::curve::{Curve, NOTABLE_PX};
 use super::reject::Reject;
 use super::width::{Hints, WidthMeasurement};
 use crate::numeric::gauss_legendre::NODES;
-pub use scene::{Memory, Scene, Side};
 use sections::Sections;
 use spread::Spread;
+pub use width_input::{Memory, Scene, Side};
 
 /// Largest angle between the bead and the gauge's axis that is measured: the
 /// 20 degrees of the contract and a little for the measurement's own noise.
@@ -112,7 +112,8 @@ impl Scene<'_> {
     }
 
     fn check_width(&self, got_mm: f64) -> Result<(), Reject> {
-        let (min_mm, max_mm) = (self.gauge.width_range.0.get(), self.gauge.width_range.1.get());
+        let range = self.gauge.width_range;
+        let (min_mm, max_mm) = (range.min.get(), range.max.get());
         if (min_mm..=max_mm).contains(&got_mm) {
             Ok(())
         } else {

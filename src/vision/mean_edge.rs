@@ -12,13 +12,14 @@
 mod column;
 mod course;
 mod descent;
-mod scene;
+mod mean_edge_input;
 mod weights;
 
 use super::coarse::StepLine;
+use super::edge_windows::PLENTY;
 use super::located::Located;
 use super::rough::RoughFit;
-use super::sheet::PLENTY;
+use super::row_range::RowRange;
 use super::strip::Grey;
 use super::vectors;
 use crate::numeric::blurred_step::StepTable;
@@ -27,7 +28,7 @@ use crate::numeric::rank;
 use column::Column;
 use course::{Bent, bend_at};
 use descent::{Descent, Goal, LONGEST_PX, MAX_STEPS, NEAR, TO_THE_END};
-pub use scene::Scene;
+pub use mean_edge_input::Scene;
 use weights::{HALF_PX, Samples, WINDOW, Weights, product};
 
 /// Half of the window about an edge at most, as a fraction of the bead's width.
@@ -300,7 +301,7 @@ impl MeanEdge {
             place[..weights.pixels].reverse();
         }
         let per_grey = scene.sign() * f64::from(scene.strip.scale) / found.step;
-        for &(from, to) in scene.lines {
+        for &RowRange { first: from, end: to } in scene.lines {
             let (mut aside, mut middle) = (0.0, 0.0);
             for row in from..to {
                 let at = self.course.at(scene.place(row));

@@ -1,32 +1,32 @@
 //! One frame after the other: bands, candidates, contours, sub-pixel edges,
 //! width.
 
-mod choice;
+mod checks;
 mod compressed;
-mod even;
-mod judge;
 mod locate;
+mod model_selection;
 mod pattern_limits;
 mod patterned;
-mod rough;
+mod rough_edges;
 mod search;
-mod skew;
+mod skew_offset;
 #[cfg(test)]
 mod tests;
+mod uniformity;
 mod work;
 
 use crate::calibration::SurfaceMap;
 use crate::core::frame::Frame;
 use crate::core::geometry::ImagePoint;
-use judge::{WIDEST_BLUR_PX, WIDEST_MOTION_PX};
+use checks::{WIDEST_BLUR_PX, WIDEST_MOTION_PX};
 use pattern_limits::STRONGEST_BESIDE_WHOLE;
-use rough::may_be_rough;
+use rough_edges::may_be_rough;
 use work::{Way, Work};
 
 use super::axis;
 use super::edge_lines;
-use super::gauge::{Gauge, Method};
-use super::noise::PixelNoise;
+use super::gauge::{Gauge, Method, WidthRangePx};
+use super::pixel_noise::PixelNoise;
 use super::pool;
 use super::reject::Reject;
 use super::roughness::{CaliperFilter, LocalWidths};
@@ -90,9 +90,15 @@ impl Measurer {
         let lines = self.work.lines.len();
         let along = View::new(self.gauge.roi, self.gauge.axis).along;
         let filter = CaliperFilter {
-            filter_px: self.work.left.along_px.max(self.work.right.along_px),
+            filter_px: self
+                .work
+                .left
+                .uncertainty
+                .along_px
+                .max(self.work.right.uncertainty.along_px),
             blur_px: measured.hints.blur_px,
-            noise_fractions: [&self.work.left, &self.work.right].map(|edge| edge.lines_fraction),
+            noise_fractions: [&self.work.left, &self.work.right]
+                .map(|edge| edge.uncertainty.lines_fraction),
             line_px: float(along) / float(lines.max(1)),
         };
         LocalWidths::read(self.calipers(), lines, filter, surface)
@@ -209,7 +215,7 @@ impl Work {
         &mut self,
         found: WidthMeasurement,
         strip: &Strip<'_, T>,
-        range: (f32, f32),
+        range: WidthRangePx,
         view: &View,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
@@ -240,7 +246,7 @@ impl Work {
     fn measure_steps<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
-        range: (f32, f32),
+        range: WidthRangePx,
         view: &View,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
@@ -266,7 +272,7 @@ impl Work {
             skew: None,
         };
         self.middles.clear();
-        self.middles.extend(self.lines.iter().map(|&line| pool::middle(line)));
+        self.middles.extend(self.lines.iter().map(|&line| line.middle()));
         for (tracer, points) in [(&self.left, &mut self.left_px), (&self.right, &mut self.right_px)]
         {
             let places = tracer.edges().iter().zip(&self.middles);
@@ -278,12 +284,13 @@ impl Work {
         let sides = [&self.left, &self.right].map(|tracer| {
             let of_compression = self.variance_of_compression(tracer, hints.contrast_grey);
             // What rows vary by, where that is known, has some of the compression in it.
-            let mean_variance = tracer.mean_variance.map(|known| known.max(of_compression));
+            let mean_variance =
+                tracer.uncertainty.mean_variance.map(|known| known.max(of_compression));
             let of_steps = if mean_variance.is_none() { of_compression } else { 0.0 };
             axis::Side {
                 places: tracer.edges(),
-                common_variance: tracer.common_variance
-                    + tracer.ground_variance
+                common_variance: tracer.uncertainty.common_variance
+                    + tracer.uncertainty.ground_variance
                     + 0.5 * skew_variance
                     + overlap_variance(width_px, tracer.blur_px)
                     + of_steps,

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use truebead::core::geometry::Roi;
 use truebead::core::units::Mm;
-use truebead::vision::{Axis, Gauge, Polarity, WidthMeasurement};
+use truebead::vision::{Axis, Gauge, Polarity, WidthMeasurement, WidthRange};
 
 use super::statistics::{median, sizes};
 use super::{data, image, measure};
@@ -77,7 +77,7 @@ fn gauge(listed: &Listed, pitch_px: f64) -> Gauge {
         width: 2 * half_width,
         height: 2 * half_height,
     };
-    let range = (Mm::constant(8.0), Mm::constant(45.0));
+    let range = WidthRange { min: Mm::constant(8.0), max: Mm::constant(45.0) };
     Gauge::new(roi, Axis::Horizontal, Polarity::Bright, range)
 }
 

@@ -7,7 +7,7 @@ use truebead::core::frame::Frame;
 use truebead::core::geometry::Roi;
 use truebead::core::units::Mm;
 use truebead::io::image_file::has_image_extension;
-use truebead::vision::{Axis, Gauge, Polarity};
+use truebead::vision::{Axis, Gauge, Polarity, WidthRange};
 
 use super::statistics::median;
 use super::{clip, data, image, measure};
@@ -35,7 +35,7 @@ fn frames(name: &str) -> Option<Vec<Frame>> {
 
 fn gauge(frame: &Frame, axis: Axis, polarity: Polarity) -> Gauge {
     let (width, height) = frame.size();
-    let range = (Mm::constant(2.0), Mm::constant(600.0));
+    let range = WidthRange { min: Mm::constant(2.0), max: Mm::constant(600.0) };
     Gauge::new(Roi { x: 0, y: 0, width, height }, axis, polarity, range)
 }
 

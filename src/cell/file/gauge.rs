@@ -4,7 +4,7 @@ use crate::core::frame::Channel;
 use crate::core::geometry::Roi;
 use crate::core::units::Mm;
 use crate::document::Table;
-use crate::vision::gauge::{self, Axis, EdgeKind, Gauge, Method, Polarity};
+use crate::vision::gauge::{self, Axis, EdgeKind, Gauge, Method, Polarity, WidthRange};
 
 /// Largest image side that is taken \[px\].
 const MAX_SIDE_PX: f64 = 65_536.0;
@@ -44,7 +44,7 @@ pub(super) fn read_gauge(table: &Table<'_>) -> Option<Gauge> {
         roi: roi?,
         axis: axis?,
         polarity: polarity?,
-        width_range: (Mm::new(min).ok()?, Mm::new(max).ok()?),
+        width_range: WidthRange { min: Mm::new(min).ok()?, max: Mm::new(max).ok()? },
         method: method?,
         calipers: usize::try_from(calipers?).ok()?,
         min_contrast_grey: min_contrast_grey?,

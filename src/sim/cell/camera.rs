@@ -17,7 +17,7 @@ use crate::sim::laid::LaidBead;
 use crate::sim::render::{RenderError, Renderer};
 use crate::sim::truth::Truth;
 use crate::sim::view::gauge_middle;
-use crate::vision::{Axis, Edges, Hints, Measurer, Reject, WidthMeasurement};
+use crate::vision::{Axis, Edges, Hints, Measurer, Reject, WidthMeasurement, WidthRange};
 
 /// What the camera saw, for a witness.
 #[derive(Debug)]
@@ -62,7 +62,7 @@ pub struct SimCamera {
     outliers: (f64, f64),
     missing_share: f64,
     /// Widths that are believed.
-    width_range: (Mm, Mm),
+    width_range: WidthRange,
     rides: bool,
     calibration: Calibration,
     surface_height: Mm,
@@ -169,7 +169,7 @@ impl SimCamera {
         }
         let seen = (truth + noise * self.noise.get()) * self.outlier(seq);
         let width = Mm::new(seen).map_err(|_| refused)?;
-        let (min, max) = self.width_range;
+        let WidthRange { min, max } = self.width_range;
         if !(min..=max).contains(&width) {
             let (got_mm, min_mm, max_mm) = (width.get(), min.get(), max.get());
             return Err(Reject::WidthOutOfRange { got_mm, min_mm, max_mm }.status());

@@ -3,14 +3,15 @@ use nalgebra::Vector3;
 use super::*;
 use crate::calibration::Camera;
 use crate::core::geometry::{Pose, Roi};
-use crate::vision::Polarity;
+use crate::vision::{Polarity, WidthRange};
 
 mod disturbed;
 
 const PAPER_SCALE: f64 = 0.126_582;
 
 fn gauge(roi: Roi, axis: Axis) -> Gauge {
-    Gauge::new(roi, axis, Polarity::Bright, (Mm::constant(1.0), Mm::constant(90.0)))
+    let range = WidthRange { min: Mm::constant(1.0), max: Mm::constant(90.0) };
+    Gauge::new(roi, axis, Polarity::Bright, range)
 }
 
 fn upright() -> Gauge {

@@ -8,7 +8,7 @@ use crate::core::geometry::Roi;
 use crate::core::units::Mm;
 use crate::scenario::bead::Roughness;
 use crate::scenario::image::Picture;
-use crate::vision::{Axis, Gauge, Polarity};
+use crate::vision::{Axis, Gauge, Polarity, WidthRange};
 
 pub use limits::Limits;
 pub use list::all;
@@ -115,7 +115,8 @@ impl Set {
             Axis::Horizontal => Roi { x: first, y: 40, width: rows, height: ACROSS.0 },
         };
         let range = if self.width_mm < 20.0 { [5.0, 25.0] } else { [20.0, 60.0] };
-        Gauge::new(roi, self.axis, self.polarity, (Mm::constant(range[0]), Mm::constant(range[1])))
+        let [min, max] = range.map(Mm::constant);
+        Gauge::new(roi, self.axis, self.polarity, WidthRange { min, max })
     }
 }
 

@@ -3,7 +3,7 @@
 
 use nalgebra::Vector2;
 
-use super::scene::Scene;
+use super::width_input::Scene;
 use crate::core::geometry::SurfacePoint;
 use crate::numeric::gauss_legendre::NODES;
 use crate::vision::curve::Curve;

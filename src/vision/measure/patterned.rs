@@ -1,19 +1,20 @@
 //! Beads that have a texture, or lie on ground that has a pattern.
 
-use super::choice::has_grains;
-use super::even;
-use super::judge::{WHOLE_SHARE, place};
+use super::checks::{WHOLE_SHARE, place};
+use super::model_selection::has_grains;
 use super::pattern_limits::{
     STRONGEST_BESIDE_WHOLE, STRONGEST_PATTERN, check_pattern, doubt_of_blur, in_texture,
 };
+use super::uniformity;
 use super::work::{NEED_SHARE, Work};
 use crate::calibration::SurfaceMap;
 use crate::numeric::number::float;
 use crate::vision::coarse::{LinePair, StepLine};
-use crate::vision::ground::{Place, Side};
+use crate::vision::gauge::WidthRangePx;
+use crate::vision::ground::{Place, Side, TOLD};
 use crate::vision::mean_edge::{BLURS_PX, Scene};
-use crate::vision::pool;
 use crate::vision::reject::Reject;
+use crate::vision::row_range::RowRange;
 use crate::vision::strip::{Grey, Strip, View};
 use crate::vision::trace::Tracer;
 use crate::vision::width::WidthMeasurement;
@@ -29,10 +30,6 @@ const ALIKE: f64 = 0.4;
 const HALF_WAY: f32 = 0.5;
 /// Blur beyond which a bead's texture is free of a flank that is not known yet \[px\].
 const LARGE_BLUR_PX: f64 = 3.0;
-/// Variance of the ground along the bead in that of the noise from which on it has a
-/// pattern: less is not told from noise.
-const TOLD: f64 = 1.25;
-
 impl Work {
     /// Standard deviation of the pattern that the ground has on both sides of a pair of
     /// lines \[grey levels\]; 0 where one side has none: what is on one side alone is a
@@ -46,7 +43,11 @@ impl Work {
             least = least.min(edge.pattern(&scene, line).unwrap_or(0.0));
         }
         let variance = least * least;
-        if variance > TOLD * noise * noise { (variance - noise * noise).sqrt() } else { 0.0 }
+        if variance > (1.0 + TOLD) * noise * noise {
+            (variance - noise * noise).sqrt()
+        } else {
+            0.0
+        }
     }
 
     /// Measures a bead whose texture shows before any edge is located. `None` where none
@@ -55,7 +56,7 @@ impl Work {
     pub(super) fn measure_busy<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
-        range: (f32, f32),
+        range: WidthRangePx,
         view: &View,
         surface: &SurfaceMap,
     ) -> Option<Result<WidthMeasurement, Reject>> {
@@ -82,7 +83,7 @@ impl Work {
     pub(super) fn measure_textured<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
-        range: (f32, f32),
+        range: WidthRangePx,
         view: &View,
         surface: &SurfaceMap,
     ) -> Option<Result<WidthMeasurement, Reject>> {
@@ -167,7 +168,7 @@ impl Work {
         let middle = 0.5 * (float(strip.along) - 1.0);
         self.places.clear();
         self.places.extend(self.lines.iter().map(|&rows| {
-            let off = pool::middle(rows) - middle;
+            let off = rows.middle() - middle;
             Place { rows, at: f64::from(line.at) + off * f64::from(line.slope) }
         }));
         let side = Side {
@@ -230,7 +231,7 @@ impl Work {
         let doubt = doubt_of_blur(blur_px);
         let variance = beside * if pattern > 0.0 { doubt } else { doubt * doubt };
         let fits = [one, other].map(|fit| fit.as_rough(blur_px, variance));
-        even::check(&fits, even::middle_grey(strip, pair))?;
+        uniformity::check(&fits, uniformity::middle_grey(strip, pair))?;
         self.left_px.clear();
         self.right_px.clear();
         let [left, right] = &self.mean_edges;
@@ -254,17 +255,17 @@ fn are_alike([left, right]: [f64; 2]) -> bool {
 }
 
 /// Where an edge lies on all caliper lines: where it is not located, between those beside it.
-fn place_all(tracer: &Tracer, lines: &[(usize, usize)], places: &mut Vec<Place>) {
+fn place_all(tracer: &Tracer, lines: &[RowRange], places: &mut Vec<Place>) {
     place(tracer, lines, places);
     if places.len() == lines.len() {
         return;
     }
     let located: Vec<(f64, f64)> =
-        places.iter().map(|place| (pool::middle(place.rows), place.at)).collect();
+        places.iter().map(|place| (place.rows.middle(), place.at)).collect();
     let (Some(first), Some(last)) = (located.first(), located.last()) else { return };
     places.clear();
     places.extend(lines.iter().map(|&rows| {
-        let row = pool::middle(rows);
+        let row = rows.middle();
         let after = located.partition_point(|place| place.0 < row);
         let (one, other) =
             (located[..after].last().unwrap_or(first), located[after..].first().unwrap_or(last));
@@ -276,7 +277,7 @@ fn place_all(tracer: &Tracer, lines: &[(usize, usize)], places: &mut Vec<Place>)
 /// What is looked at for one edge of a pair.
 fn scene<'a, T: Grey>(
     strip: &'a Strip<'a, T>,
-    lines: &'a [(usize, usize)],
+    lines: &'a [RowRange],
     pair: &LinePair,
     bead_after: bool,
 ) -> Scene<'a, T> {

@@ -9,10 +9,11 @@ use crate::vision::gauge::Gauge;
 use crate::vision::ground::{Ground, Place};
 use crate::vision::mean_edge::MeanEdge;
 use crate::vision::motion::BlurShapes;
-use crate::vision::noise::PixelNoise;
 use crate::vision::parallel::Parallel;
+use crate::vision::pixel_noise::PixelNoise;
 use crate::vision::pool::Bands;
 use crate::vision::rough::RoughEdge;
+use crate::vision::row_range::RowRange;
 use crate::vision::trace::Tracer;
 
 /// Share of the caliper lines that must show each of the two edges.
@@ -37,7 +38,7 @@ pub(super) struct Work {
     pub(super) gauge: Gauge,
     pub(super) blur_shapes: BlurShapes,
     pub(super) bands: Bands,
-    pub(super) lines: Vec<(usize, usize)>,
+    pub(super) lines: Vec<RowRange>,
     pub(super) noise: PixelNoise,
     /// Scale across the gauge's middle.
     pub(super) mm_per_px: f64,

@@ -8,6 +8,7 @@ use super::look::{Look, MAX_STEPS, SHADING_SD, place_limit};
 use super::step::{Extent, Flank, Flanks, LEAST_BLUR_PX, Step};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::normal_equations::Normal;
+use crate::vision::blur_estimate::BlurEstimate;
 
 /// Unknowns: place, blur, levels and shading of the edge, then place, height and
 /// blur of what lies before it and after it.
@@ -35,7 +36,7 @@ impl Overlay {
         &self,
         table: &StepTable,
         start: &Look,
-        known: Option<(f64, f64)>,
+        known: Option<BlurEstimate>,
     ) -> Option<Look> {
         let mut look = *start;
         for _ in 0..MAX_STEPS {
@@ -100,12 +101,12 @@ fn reach(look: &Look) -> Extent {
 }
 
 /// Holds what is known, and unknowns that there are not.
-fn hold(normal: &mut Normal<UNKNOWNS>, look: &Look, known: Option<(f64, f64)>) {
+fn hold(normal: &mut Normal<UNKNOWNS>, look: &Look, known: Option<BlurEstimate>) {
     let weight = |sd: f64| (look.noise / sd).powi(2);
     normal.hold(4, weight(SHADING_SD), -look.shading[0]);
     normal.hold(5, weight(SHADING_SD), -look.shading[1]);
-    if let Some((mean, sd)) = known {
-        normal.hold(1, weight(sd), mean - look.step.blur);
+    if let Some(BlurEstimate { px, sd_px }) = known {
+        normal.hold(1, weight(sd_px), px - look.step.blur);
     }
     for (flank, first) in look.flanks.0.iter().zip(FLANKS) {
         match flank {

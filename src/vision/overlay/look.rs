@@ -4,6 +4,7 @@
 use super::REACH;
 use super::step::{Extent, Flank, Flanks, Step};
 use crate::numeric::blurred_step::StepTable;
+use crate::vision::blur_estimate::BlurEstimate;
 
 /// How far from the edge samples are fitted, in blurs and pixels beside.
 const FIT_BLURS: f64 = 4.5;
@@ -42,10 +43,18 @@ pub struct Look {
     pub(super) doubt: f64,
 }
 
+/// Distances from an edge between which nothing else lies \[px\].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Distances {
+    /// Beyond the flank.
+    pub near: usize,
+    /// The end.
+    pub far: usize,
+}
+
 impl Look {
-    /// Samples beside the edge on either side: distances of the nearest and the
-    /// farthest \[px\].
-    pub fn beside(&self) -> [(usize, usize); 2] {
+    /// Samples beside the edge on either side.
+    pub fn beside(&self) -> [Distances; 2] {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -55,8 +64,8 @@ impl Look {
         let near = 3.0 * self.step.blur + 1.0;
         let to = |room: f64| whole(room).min(REACH);
         [
-            (whole((near - self.step.at).ceil()), to(self.room.before)),
-            (whole((near + self.step.at).ceil()), to(self.room.after)),
+            Distances { near: whole((near - self.step.at).ceil()), far: to(self.room.before) },
+            Distances { near: whole((near + self.step.at).ceil()), far: to(self.room.after) },
         ]
     }
 
@@ -65,9 +74,9 @@ impl Look {
         self.pixel_noise
     }
 
-    /// Blur and its standard deviation \[px\].
-    pub fn blur(&self) -> (f64, f64) {
-        (self.step.blur, self.blur_sd)
+    /// Its blur.
+    pub fn blur(&self) -> BlurEstimate {
+        BlurEstimate { px: self.step.blur, sd_px: self.blur_sd }
     }
 
     /// Mean square of the residuals about the edge, in variances of their noise: at

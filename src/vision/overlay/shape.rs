@@ -2,9 +2,10 @@
 //! and how they are shaded.
 
 use super::look::Look;
-use super::step::{Extent, Flanks, LEAST_BLUR_PX, Step};
+use super::step::{Extent, FlankedStep, Flanks, LEAST_BLUR_PX, Step};
 use super::{Overlay, ROUNDING};
 use crate::numeric::blurred_step::StepTable;
+use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::line::Line;
 
 /// How the level beside an edge changes away from it.
@@ -71,21 +72,27 @@ impl Overlay {
         after: bool,
     ) -> (f64, (f64, f64)) {
         let (sign, room) = if after { (1.0, look.room.after) } else { (-1.0, look.room.before) };
-        let (extent, line) = self.plain(table, (step, &look.flanks), look.pixel_noise, sign, room);
+        let (extent, line) = self.plain(
+            table,
+            FlankedStep { step, flanks: &look.flanks },
+            look.pixel_noise,
+            sign,
+            room,
+        );
         (extent, line.sure_slope(look.pixel_noise))
     }
 
-    /// Reads the edge's shape from a look at it and what is known of its blur:
-    /// mean and standard deviation \[px\].
+    /// Reads the edge's shape from a look at it and what is known of its blur.
     #[inline(always)]
-    pub fn shape(&self, table: &StepTable, look: &Look, blur: (f64, f64)) -> Option<Shape> {
+    pub fn shape(&self, table: &StepTable, look: &Look, blur: BlurEstimate) -> Option<Shape> {
         let look = self.fit_known(table, look, blur)?;
         let Look { step, noise, room, flanks, doubt, .. } = look;
         let sharp = step.blur * step.blur - ROUNDING;
         let step = Step { blur: sharp.max(LEAST_BLUR_PX.powi(2)).sqrt(), ..step };
-        let noise = (noise, look.pixel_noise);
-        let before = self.one_side(table, (&step, &flanks), noise, (-1.0, room.before));
-        let after = self.one_side(table, (&step, &flanks), noise, (1.0, room.after));
+        let edge = FlankedStep { step: &step, flanks: &flanks };
+        let pixel_noise = look.pixel_noise;
+        let before = self.one_side(table, edge, noise, pixel_noise, -1.0, room.before);
+        let after = self.one_side(table, edge, noise, pixel_noise, 1.0, room.after);
         // A level that is off by a share moves the edge by √π blurs times it.
         let per_level = std::f64::consts::PI * step.blur * step.blur;
         Some(Shape {
@@ -103,13 +110,15 @@ impl Overlay {
     fn one_side(
         &self,
         table: &StepTable,
-        step: (&Step, &Flanks),
-        (noise, pixel_noise): (f64, f64),
-        (sign, room): (f64, f64),
+        edge: FlankedStep<'_>,
+        noise: f64,
+        pixel_noise: f64,
+        sign: f64,
+        room: f64,
     ) -> Beside {
-        let (extent, line) = self.plain(table, step, noise, sign, room);
+        let (extent, line) = self.plain(table, edge, noise, sign, room);
         if extent + 2.0 <= room
-            && let Some(curved) = self.curved(table, step, noise, (sign, room))
+            && let Some(curved) = self.curved(table, edge, noise, sign, room)
         {
             return curved;
         }
@@ -123,8 +132,9 @@ impl Overlay {
     pub(super) fn beside_step(
         &self,
         table: &StepTable,
-        (step, flanks): (&Step, &Flanks),
-        (sign, from): (f64, f64),
+        FlankedStep { step, flanks }: FlankedStep<'_>,
+        sign: f64,
+        from: f64,
         mut add: impl FnMut(f64, f64, f64),
     ) {
         let height = step.after - step.before;
@@ -145,18 +155,18 @@ impl Overlay {
     fn plain(
         &self,
         table: &StepTable,
-        (shape, flanks): (&Step, &Flanks),
+        edge: FlankedStep<'_>,
         noise: f64,
         sign: f64,
         room: f64,
     ) -> (f64, Line) {
-        let height = shape.after - shape.before;
-        let first = 3.0 * shape.blur;
+        let height = edge.step.after - edge.step.before;
+        let first = 3.0 * edge.step.blur;
         let mut line = Line::default();
         let mut end = first.min(room);
         while end + 2.0 <= room {
             let mut block = Line::default();
-            self.beside_step(table, (shape, flanks), (sign, end), |away, off, weight| {
+            self.beside_step(table, edge, sign, end, |away, off, weight| {
                 block.add(away, off, weight);
             });
             if block.weight <= 0.0 {

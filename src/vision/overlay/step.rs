@@ -87,3 +87,12 @@ impl Flanks {
         Self(self.0.map(|flank| flank.filter(near)))
     }
 }
+
+/// A step and the steps beside it.
+#[derive(Debug, Clone, Copy)]
+pub struct FlankedStep<'a> {
+    /// The step.
+    pub step: &'a Step,
+    /// Those beside it.
+    pub flanks: &'a Flanks,
+}

@@ -2,10 +2,11 @@
 
 use super::Overlay;
 use super::look::{Look, MAX_STEPS, SHADING_SD};
-use super::slopes::Slopes;
+use super::slopes::{SlopeLimits, Slopes};
 use super::step::{Extent, Flanks, LEAST_BLUR_PX, Step};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::float;
+use crate::vision::blur_estimate::BlurEstimate;
 
 /// Largest blur of a step \[px\].
 const MOST_BLUR_PX: f64 = 15.0;
@@ -29,7 +30,7 @@ impl Overlay {
         let blur = (0.2 / slope).clamp(0.5, MOST_BLUR_PX);
         let step = Step { at, blur, before: 0.0, after: 1.0 };
         let whole_room = room;
-        let (room, flanks) = self.up_to_neighbours(&slopes, step, (noise, NOTABLE), room);
+        let (room, flanks) = self.up_to_neighbours(&slopes, step, noise, NOTABLE, room);
         let look = Look {
             step,
             blur_sd: f64::INFINITY,
@@ -52,8 +53,8 @@ impl Overlay {
             return Some(look);
         }
         // A weaker step beside it, if that explains what is left.
-        let weaker = (noise, WEAK_SHARE * NOTABLE);
-        let (_, flanks) = self.up_to_neighbours(&slopes, step, weaker, whole_room);
+        let weaker = WEAK_SHARE * NOTABLE;
+        let (_, flanks) = self.up_to_neighbours(&slopes, step, noise, weaker, whole_room);
         let start = Look { flanks: flanks.near(&look.step), ..look };
         let found = start.flanks.any().then(|| self.fit_flanks(table, &start, None)).flatten();
         Some(found.filter(|found| !found.is_strange()).unwrap_or(look))
@@ -61,10 +62,7 @@ impl Overlay {
 
     /// Fits the edge of a look with another shape of the blur.
     pub fn fit_again(&self, table: &StepTable, look: &Look) -> Option<Look> {
-        if look.flanks.any() {
-            return self.fit_flanks(table, look, None);
-        }
-        self.fit(table, *look, None)
+        self.fit_from(table, look, None)
     }
 
     /// Fits the edge again with what is known of its blur.
@@ -73,13 +71,27 @@ impl Overlay {
         &self,
         table: &StepTable,
         look: &Look,
-        blur: (f64, f64),
+        blur: BlurEstimate,
     ) -> Option<Look> {
-        if !look.flanks.any() {
-            return self.fit(table, *look, Some(blur));
+        let fitted = self.fit_from(table, look, Some(blur));
+        if fitted.is_some() || !look.flanks.any() {
+            return fitted;
         }
-        let fitted = self.fit_flanks(table, look, Some(blur));
-        fitted.or_else(|| self.fit(table, look.without_flanks(), Some(blur)))
+        self.fit(table, look.without_flanks(), Some(blur))
+    }
+
+    /// Fits the edge of a look and the steps beside it.
+    #[inline(always)]
+    fn fit_from(
+        &self,
+        table: &StepTable,
+        look: &Look,
+        known: Option<BlurEstimate>,
+    ) -> Option<Look> {
+        if look.flanks.any() {
+            return self.fit_flanks(table, look, known);
+        }
+        self.fit(table, *look, known)
     }
 
     /// Cuts the room off half-way to a neighbouring step: where the slope has
@@ -90,18 +102,19 @@ impl Overlay {
         &self,
         slopes: &Slopes,
         start: Step,
-        (noise, notable): (f64, f64),
+        noise: f64,
+        notable: f64,
         room: Extent,
     ) -> (Extent, Flanks) {
-        let limits = (noise / (2.0 * self.used().max(1.0)).sqrt(), notable);
-        let (before, flank_before) = slopes.up_to_neighbour(start, limits, (-1, room.before));
-        let (after, flank_after) = slopes.up_to_neighbour(start, limits, (1, room.after));
+        let limits = SlopeLimits { noise: noise / (2.0 * self.used().max(1.0)).sqrt(), notable };
+        let (before, flank_before) = slopes.up_to_neighbour(start, limits, -1, room.before);
+        let (after, flank_after) = slopes.up_to_neighbour(start, limits, 1, room.after);
         (Extent { before, after }, Flanks([flank_before, flank_after]))
     }
 
     /// Fits place, blur, levels and a little shading about the edge.
     #[inline(always)]
-    fn fit(&self, table: &StepTable, start: Look, known: Option<(f64, f64)>) -> Option<Look> {
+    fn fit(&self, table: &StepTable, start: Look, known: Option<BlurEstimate>) -> Option<Look> {
         let mut look = start;
         let mut last = None;
         let hold = |sd: f64| (start.noise / sd).powi(2);
@@ -114,8 +127,8 @@ impl Overlay {
             let mut normal = linear.normal();
             normal.hold(4, of_shading, -look.shading[0]);
             normal.hold(5, of_shading, -look.shading[1]);
-            if let Some((mean, sd)) = known {
-                normal.hold(1, hold(sd), mean - step.blur);
+            if let Some(BlurEstimate { px, sd_px }) = known {
+                normal.hold(1, hold(sd_px), px - step.blur);
             }
             let solved = normal.solve()?;
             let moved = solved.unknowns;

@@ -3,13 +3,13 @@
 
 use super::crossing::{self, Crossing, Flank};
 use super::kernel;
-use super::scene::Scene;
+use super::rough_input::Scene;
 use super::window::{BLOCK_ROWS, STRAIGHT_ROWS, Windows};
 use crate::numeric::number::whole;
 use crate::numeric::number::{float, single};
 use crate::numeric::rank;
+use crate::vision::edge_windows::SPAN;
 use crate::vision::gauge::EdgeKind;
-use crate::vision::sheet::SPAN;
 
 /// Pixels outside that are searched for what the bead stands against: a groove's
 /// darkest place or the ground.

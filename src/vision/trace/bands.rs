@@ -6,7 +6,6 @@ use super::{NEAR_ENOUGH, Scene, Tracer};
 use crate::numeric::number::{float, narrow};
 use crate::numeric::rank;
 use crate::vision::located::Located;
-use crate::vision::pool;
 use crate::vision::strip::Grey;
 
 /// Share of its rows that a band must have left to count.
@@ -21,24 +20,25 @@ impl Tracer {
     /// Solves every band; returns whether the path was near enough for that.
     #[inline(always)]
     pub(super) fn locate<T: Grey>(&mut self, scene: &Scene<'_, T>, blur: f64) -> bool {
-        let variance = match self.scatter_in_texture {
+        let variance = match self.textured.scatter {
             Some(scatter) => scatter.of_mean * self.left_of_texture(),
             None => f64::from(scene.noise).powi(2),
         };
-        let core = self.template.products.matrix();
+        let core = self.row_fit.template.products.matrix();
         let extra = [0, 1].map(|side| self.extra_variance(core, variance, side));
-        let plain = self.template.plain_pixels();
-        let least_share = if self.clear.is_empty() { LEAST_SHARE } else { LEAST_CLEAR_SHARE };
+        let plain = self.row_fit.template.plain_pixels();
+        let least_share =
+            if self.occlusion.clear.is_empty() { LEAST_SHARE } else { LEAST_CLEAR_SHARE };
         self.edges.clear();
-        let textured = self.texture.is_some();
+        let textured = self.textured.texture.is_some();
         let mut off: f64 = 0.0;
-        for (band, sums) in self.solved.iter().enumerate() {
+        for (band, sums) in self.row_fit.solved.iter().enumerate() {
             let located =
                 sums.solve(core, variance, extra, plain, least_share).map(|(moved, located)| {
                     let bent = if textured { 0.0 } else { moved / blur };
                     let moved = moved * (1.0 + bent * bent / 12.0);
                     off = off.max(moved.abs());
-                    let [path, _, _] = self.course.at(narrow(pool::middle(scene.lines[band])));
+                    let [path, _, _] = self.course.at(narrow(scene.lines[band].middle()));
                     Located { at: f64::from(path) + moved, ..located }
                 });
             self.edges.push(located);
@@ -65,9 +65,9 @@ impl Tracer {
     fn extra_variance(&mut self, core: Matrix3<f64>, variance: f64, side: usize) -> f64 {
         let Some(inverse) = core.try_inverse() else { return 0.0 };
         let level = inverse.row(side + 1).transpose();
-        self.scatter.clear();
+        self.scratch.scatter.clear();
         let mut explained = 0.0;
-        for sums in &self.solved {
+        for sums in &self.row_fit.solved {
             let (count, sum) = if side == 0 { sums.before } else { sums.after };
             if sums.rows < 1.0 || count < 1.0 {
                 continue;
@@ -77,14 +77,13 @@ impl Tracer {
             let off = at_edge - sum * per_pixel;
             let expected = variance * (level[side + 1] * per_row + per_pixel);
             explained += expected;
-            self.scatter.push(off * off / expected);
+            self.scratch.scatter.push(off * off / expected);
         }
-        if self.scatter.len() < 6 {
+        if self.scratch.scatter.len() < 6 {
             return 0.0;
         }
-        let bands = float(self.scatter.len());
-        // 0.455 is the median of the square of a standard normal number.
-        let ratio = rank::median(&mut self.scatter).unwrap_or(0.0) / 0.455;
+        let bands = float(self.scratch.scatter.len());
+        let ratio = rank::median(&mut self.scratch.scatter).unwrap_or(0.0) / rank::MEDIAN_SQUARE;
         let doubt = 2.3 / bands.sqrt();
         if ratio < 1.0 + BELIEVED * doubt { 0.0 } else { (ratio - 1.0) * explained / bands }
     }

@@ -8,7 +8,7 @@ use crate::core::units::{Mm, MmPerS};
 use crate::scenario::bead::{BeadModel, Roughness};
 use crate::scenario::disturbance::Flow;
 use crate::scenario::image::Picture;
-use crate::vision::{Axis, Gauge, Polarity};
+use crate::vision::{Axis, Gauge, Polarity, WidthRange};
 
 const SMOOTH_STEADY: Simulation = Simulation {
     seed: 1,
@@ -50,7 +50,7 @@ fn camera() -> (RenderedCamera, RobotView, Sender<()>) {
             Roi { x: 10, y: 10, width: 140, height: 100 },
             Axis::Vertical,
             Polarity::Bright,
-            (Mm::constant(1.0), Mm::constant(15.0)),
+            WidthRange { min: Mm::constant(1.0), max: Mm::constant(15.0) },
         )
     };
     let described = Camera {

@@ -1,6 +1,7 @@
 //! What is looked at for an edge on the mean over its rows.
 
 use crate::numeric::number::{float, floor, narrow};
+use crate::vision::row_range::RowRange;
 use crate::vision::strip::{Grey, Strip};
 
 /// What is looked at.
@@ -8,8 +9,8 @@ use crate::vision::strip::{Grey, Strip};
 pub struct Scene<'a, T> {
     /// The gauge's pixels.
     pub strip: &'a Strip<'a, T>,
-    /// Its caliper lines: first row and the row after the last of each.
-    pub lines: &'a [(usize, usize)],
+    /// Rows of its caliper lines.
+    pub lines: &'a [RowRange],
     /// Distance of the two edges \[px\].
     pub width_px: f32,
     /// Whether the bead lies after the edge.

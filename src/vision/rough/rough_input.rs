@@ -2,6 +2,7 @@
 
 use crate::numeric::blurred_step::StepTable;
 use crate::vision::gauge::EdgeKind;
+use crate::vision::row_range::RowRange;
 use crate::vision::strip::Strip;
 
 /// What is looked at.
@@ -9,8 +10,8 @@ use crate::vision::strip::Strip;
 pub struct Scene<'a, T> {
     /// The gauge's pixels.
     pub strip: &'a Strip<'a, T>,
-    /// Its caliper lines: first row and the row after the last of each.
-    pub lines: &'a [(usize, usize)],
+    /// Rows of its caliper lines.
+    pub lines: &'a [RowRange],
     /// Standard deviation of a pixel's noise \[grey levels\].
     pub noise: f32,
     /// Distance of the two edges \[px\].
