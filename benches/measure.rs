@@ -18,6 +18,7 @@ use truebead::core::frame::{Frame, Pixels};
 use truebead::core::geometry::Roi;
 use truebead::core::time::Stamp;
 use truebead::core::units::Mm;
+use truebead::core::units::WidthRange;
 use truebead::scenario::image::Picture;
 use truebead::sim::render::Renderer;
 use truebead::vision::{Axis, Gauge, Measurer, Method, Polarity};
@@ -49,7 +50,7 @@ fn gauge(axis: Axis, method: Method) -> Gauge {
             Roi { x: 40, y: 20, width: 640, height: 500 },
             axis,
             Polarity::Bright,
-            (Mm::constant(20.0), Mm::constant(60.0)),
+            WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
         )
     }
 }

@@ -7,6 +7,7 @@ use truebead::calibration::Calibration;
 use truebead::core::geometry::Roi;
 use truebead::core::time::Stamp;
 use truebead::core::units::Mm;
+use truebead::core::units::WidthRange;
 use truebead::scenario::image::{Motion, Picture};
 use truebead::sim::render::Renderer;
 use truebead::vision::{Axis, Gauge, Polarity};
@@ -38,7 +39,7 @@ fn picture(bencher: Bencher<'_, '_>, name: &str) {
         Roi { x: 40, y: 10, width: 640, height: 80 },
         Axis::Vertical,
         Polarity::Bright,
-        (Mm::constant(20.0), Mm::constant(60.0)),
+        WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
     );
     let scale = Calibration::Scale { mm_per_px: 0.126_582, sigma: None };
     let renderer = Renderer::new(scale, Mm::ZERO, gauge, disturbed(name), 1).expect("a sound cell");

@@ -2,6 +2,7 @@
 
 pub mod average;
 pub mod blurred_step;
+pub mod gauss_legendre;
 pub mod hampel;
 pub mod lti;
 pub mod normal_distribution;

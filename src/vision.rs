@@ -3,25 +3,25 @@
 //! [`Measurer`] has seen its first frame.
 //!
 //! ```text
-//! gamma    grey levels of a camera with a gamma → light
-//! strip    frame → rows across the bead
-//! noise    rows → what a pixel's noise is
-//! pool     rows → bands, a profile of a few rows each
-//! edge     profile → the strongest steps
-//! contour  steps → edges that run along the bead
-//! pair     contours → the two edges of the bead
-//! trace    contour → sub-pixel places, one a caliper line, from all rows:
-//!          path, overlay (blur, surroundings), template, bands; texture and
-//!          whiten where the surroundings are not plain
-//! covered  the same for edges that only the other one shows where to look for
-//!          (parallel)
-//! cut_off  the same for edges one side of which passes the end of the
-//!          camera's scale (censor)
-//! refine   the same for edges that are no blurred steps (fit, blur)
-//! outlier  places that disagree with their neighbours
-//! axis     places → width normal to the bead, on the surface (curve, scatter,
-//!          waviness)
-//! roughness  local widths of successive frames → roughness of the bead
+//! gamma         grey levels of a camera with a gamma → light
+//! strip         frame → rows across the bead
+//! pixel_noise   rows → what a pixel's noise is
+//! pool          rows → bands, a profile of a few rows each
+//! edge          profile → the strongest steps
+//! contour       steps → edges that run along the bead
+//! pair          contours → the two edges of the bead
+//! trace         contour → sub-pixel places, one a caliper line, from all rows:
+//!               path, overlay (blur, surroundings), template, bands; texture and
+//!               whiten where the surroundings are not plain
+//! occluded      the same for edges that only the other one shows where to look for
+//!               (parallel)
+//! clipped_step  the same for edges one side of which passes the end of the
+//!               camera's scale (censor)
+//! refine        the same for edges that are no blurred steps (fit, blur)
+//! outlier       places that disagree with their neighbours
+//! axis          places → width normal to the bead, on the surface (curve, scatter,
+//!               waviness)
+//! roughness     local widths of successive frames → roughness of the bead
 //! ```
 //!
 //! The loops over pixels are compiled once for each width of vectors that
@@ -35,42 +35,45 @@
     reason = "a loop takes part in the choice of vectors only where it is inlined into it"
 )]
 
-mod agree;
 mod axis;
 mod blur;
+mod blur_estimate;
 mod censor;
+mod clipped_step;
 mod coarse;
+mod consensus;
 mod contour;
 mod corner;
-mod covered;
 mod curve;
-mod cut_off;
 mod edge;
 mod edge_lines;
+mod edge_windows;
 mod fit;
 mod gamma;
 pub mod gauge;
 mod ground;
 mod light;
 mod line;
+mod located;
 mod mean_edge;
 mod measure;
 mod motion;
-mod noise;
+mod occluded;
 mod outlier;
 mod overlay;
 mod pair;
 mod parallel;
 mod path;
 mod phase;
+mod pixel_noise;
 mod pool;
 mod refine;
 pub mod reject;
 mod rough;
 pub mod roughness;
+mod row_range;
 mod saturated;
 mod scatter;
-mod sheet;
 mod strip;
 mod template;
 mod texture;

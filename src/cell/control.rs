@@ -1,7 +1,7 @@
 //! `[control]` and `[limits]`: what the controller is to do, and what it may.
 
 use crate::core::time::Span;
-use crate::core::units::{Mm, MmPerS, MmPerS2};
+use crate::core::units::{Mm, MmPerS, MmPerS2, WidthRange};
 use crate::document::Table;
 use crate::vision::Gauge;
 use crate::width_control::limiter::Limits;
@@ -70,7 +70,7 @@ pub fn check_target(
     target: &Target,
     gauge: &Gauge,
 ) {
-    let (low, high) = gauge.width_range;
+    let WidthRange { min: low, max: high } = gauge.width_range;
     let outside = |width: &Mm| *width < low || *width > high;
     let report = |table: &Table<'_>, key: &'static str, width: Mm| {
         let expected = format!("within width_range_mm of [gauge], {low} to {high}");

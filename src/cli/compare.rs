@@ -10,6 +10,7 @@ use super::{Voice, WrongArguments};
 use crate::assembly::LoadedCell;
 use crate::cell::file::{Purpose, RunPart};
 use crate::core::units::Mm;
+use crate::core::units::WidthRange;
 use crate::io::progress::Progress;
 use crate::report::compare::Comparison;
 use crate::rows::output;
@@ -150,7 +151,7 @@ fn widths(args: &CompareArgs, contenders: &[Contender]) -> anyhow::Result<Vec<Mm
         WrongArguments::new(what)
     })?;
     for who in contenders {
-        let (low, high) = who.cell.gauge.width_range;
+        let WidthRange { min: low, max: high } = who.cell.gauge.width_range;
         if let Some(width) = widths.iter().find(|width| **width < low || **width > high) {
             let what = format!(
                 "--widths: found {width}, expected {low} to {high}, which is the width_range_mm of {}",

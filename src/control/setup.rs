@@ -1,7 +1,7 @@
 //! Everything that a controller has to know of its cell.
 
 use crate::core::time::Span;
-use crate::core::units::{Mm, MmPerS};
+use crate::core::units::{Mm, MmPerS, WidthRange};
 use crate::width_control::limiter::Limits;
 use crate::width_control::settings::Control;
 use crate::width_control::strategy::CellFacts;
@@ -14,7 +14,7 @@ pub struct Setup {
     /// What setpoints may be.
     pub limits: Limits,
     /// Narrowest and widest width that is accepted.
-    pub width_range: (Mm, Mm),
+    pub width_range: WidthRange,
     /// Speed of the first part of a bead.
     pub start_speed: MmPerS,
     /// Its length.

@@ -9,7 +9,7 @@ use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::Span;
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS2;
-use crate::core::units::{Mm, MmPerS};
+use crate::core::units::{Mm, MmPerS, WidthRange};
 use crate::width_control::limiter::{Limit, Limits};
 use crate::width_control::pi::PiGains;
 use crate::width_control::settings::Control;
@@ -40,7 +40,7 @@ pub fn setup() -> Setup {
         setpoint_period: Span::from_millis(200),
         camera_offset_sigma: Mm::constant(8.84),
         gauge_length: Mm::constant(12.7),
-        width_range: (Mm::constant(20.0), Mm::constant(60.0)),
+        width_range: WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
     }
 }
 

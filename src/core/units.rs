@@ -185,6 +185,15 @@ impl Mul<Span> for MmPerS2 {
     }
 }
 
+/// Narrowest and widest width of a bead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WidthRange {
+    /// The narrowest.
+    pub min: Mm,
+    /// The widest.
+    pub max: Mm,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

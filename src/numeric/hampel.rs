@@ -5,9 +5,6 @@
 
 use super::rank;
 
-/// What makes a median absolute deviation the standard deviation of normal
-/// noise.
-const SCALE: f64 = 1.4826;
 /// Windows beyond this are no windows.
 const MAX_HALF_WIDTH: usize = 10_000;
 
@@ -85,7 +82,8 @@ impl Hampel {
             *value = (*value - middle).abs();
         }
         let deviation = median(scratch).unwrap_or(0.0);
-        let is_inlier = (sample - middle).abs() <= self.threshold * SCALE * deviation;
+        let is_inlier =
+            (sample - middle).abs() <= self.threshold * rank::SIGMA_PER_MEDIAN * deviation;
         if is_inlier { sample } else { middle }
     }
 }

@@ -5,6 +5,8 @@
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 use std::sync::LazyLock;
 
+/// √(2π): the slope of a Gaussian flank is its height over that and its blur.
+pub const ROOT_TWO_PI: f64 = 2.506_628_274_631_000_5;
 const NODES_PER_UNIT: f64 = 16.0;
 /// The nodes reach from −`END` to `END`; beyond, the tail is less than 10⁻²³.
 const END: f64 = 10.0;

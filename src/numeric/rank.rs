@@ -6,6 +6,9 @@ use std::cmp::Ordering;
 /// Standard deviation of normal numbers over the median of their magnitudes.
 pub const SIGMA_PER_MEDIAN: f64 = 1.4826;
 
+/// Median of the square of a standard normal number.
+pub const MEDIAN_SQUARE: f64 = 0.455;
+
 /// Numbers that have an order.
 pub trait Ordered: Copy {
     /// The total order of IEEE 754.

@@ -160,6 +160,7 @@ mod tests {
     use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
     use crate::core::units::Mm;
+    use crate::core::units::WidthRange;
     use crate::rows::frame_row::sample;
     use crate::vision::{Axis, Polarity};
 
@@ -170,7 +171,7 @@ mod tests {
                 Roi { x: 4, y: 4, width: 24, height: 16 },
                 Axis::Vertical,
                 Polarity::Any,
-                (Mm::constant(1.0), Mm::constant(100.0)),
+                WidthRange { min: Mm::constant(1.0), max: Mm::constant(100.0) },
             )
         })
     }

@@ -16,6 +16,7 @@ use crate::core::frame::{Frame, Pixels};
 use crate::core::geometry::{ImagePoint, Roi, Size};
 use crate::core::robot::{RobotMode, RobotState};
 use crate::core::time::Stamp;
+use crate::core::units::WidthRange;
 use crate::core::units::{Mm, MmPerS, MmPerS2};
 use crate::report::run::RunPage;
 use crate::rows::frame_row::{ControlColumns, FrameRow, sample};
@@ -34,7 +35,7 @@ pub fn gauge() -> Gauge {
         Roi { x: 100, y: 60, width: 520, height: 420 },
         Axis::Vertical,
         Polarity::Bright,
-        (Mm::constant(20.0), Mm::constant(60.0)),
+        WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
     )
 }
 

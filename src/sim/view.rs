@@ -124,6 +124,7 @@ pub struct Place {
 mod tests {
     use super::*;
     use crate::core::units::Mm;
+    use crate::core::units::WidthRange;
     use crate::vision::Polarity;
 
     fn gauge(axis: Axis) -> Gauge {
@@ -131,7 +132,7 @@ mod tests {
             Roi { x: 10, y: 20, width: 101, height: 51 },
             axis,
             Polarity::Bright,
-            (Mm::ZERO, Mm::constant(50.0)),
+            WidthRange { min: Mm::ZERO, max: Mm::constant(50.0) },
         )
     }
 

@@ -4,20 +4,18 @@
 
 mod sections;
 mod spread;
+mod width_input;
 
-use crate::calibration::SurfaceMap;
-use crate::core::geometry::SurfacePoint;
 use crate::core::units::Mm;
 
 use super::corner;
-use super::curve::{Curve, NOTABLE_PX, Point};
-use super::gauge::Gauge;
+use super::curve::{Curve, NOTABLE_PX};
 use super::reject::Reject;
-use super::strip::View;
-use super::trace::Located;
 use super::width::{Hints, WidthMeasurement};
+use crate::numeric::gauss_legendre::NODES;
 use sections::Sections;
 use spread::Spread;
+pub use width_input::{Memory, Scene, Side};
 
 /// Largest angle between the bead and the gauge's axis that is measured: the
 /// 20 degrees of the contract and a little for the measurement's own noise.
@@ -33,53 +31,6 @@ const LEAST_TURN_RAD: f64 = 0.25;
 /// Share of the gauge on either side of its middle from which the edge points
 /// there are taken.
 const MIDDLE_SHARE: f64 = 0.125;
-/// Places and weights of the Gauss–Legendre rule by which the mean over the
-/// gauge is taken.
-const NODES: [(f64, f64); 5] = [
-    (-0.906_179_845_938_664, 0.236_926_885_056_189),
-    (-0.538_469_310_105_683, 0.478_628_670_499_366),
-    (0.0, 0.568_888_888_888_889),
-    (0.538_469_310_105_683, 0.478_628_670_499_366),
-    (0.906_179_845_938_664, 0.236_926_885_056_189),
-];
-
-/// One edge as it was found.
-#[derive(Debug, Clone, Copy)]
-pub struct Side<'a> {
-    /// Its places, band by band.
-    pub places: &'a [Option<Located>],
-    /// Variance of the whole edge's position that all places share \[px²\].
-    pub common_variance: f64,
-    /// What a row leaves of the step that it is held against, in standard
-    /// deviations of its noise; infinite where it was not held against one.
-    pub misfit: f64,
-    /// Variance of the mean position over the gauge \[px²\], where it is known
-    /// without looking at how far the places lie off their course.
-    pub mean_variance: Option<f64>,
-}
-
-/// What a width is taken from.
-#[derive(Debug, Clone, Copy)]
-pub struct Scene<'a> {
-    /// The gauge over the image.
-    pub view: &'a View,
-    /// From pixels to millimetres.
-    pub surface: &'a SurfaceMap,
-    /// What is expected.
-    pub gauge: &'a Gauge,
-    /// Middles of the bands along the bead \[px\].
-    pub middles: &'a [f64],
-    /// Left and right edge.
-    pub sides: [Side<'a>; 2],
-}
-
-/// Memory that is kept from frame to frame.
-#[derive(Debug, Clone, Default)]
-pub struct Memory {
-    off: [Vec<Option<f64>>; 2],
-    values: Vec<f64>,
-}
-
 /// Width of the bead.
 pub fn width(
     scene: &Scene<'_>,
@@ -112,29 +63,6 @@ pub fn width(
 }
 
 impl Scene<'_> {
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    fn centre(&self) -> f64 {
-        (self.view.along - 1) as f64 / 2.0
-    }
-
-    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-    fn reach(&self) -> f64 {
-        self.view.along as f64 / 2.0
-    }
-
-    /// Place of a band along the gauge, −1 to 1.
-    fn place(&self, band: usize) -> f64 {
-        (self.middles[band] - self.centre()) / self.reach()
-    }
-
-    fn points(&self, side: usize) -> impl Iterator<Item = Point> + Clone {
-        let places = self.sides[side].places.iter().enumerate();
-        places.filter_map(|(band, located)| {
-            let located = (*located)?;
-            Some(Point { t: self.place(band), u: located.at, weight: located.share })
-        })
-    }
-
     /// Angle of the bead in the middle of the gauge \[rad\]; refuses beads that
     /// run too far off the gauge's axis there or at its ends.
     fn slant(&self, [left, right]: &[Curve; 2]) -> Result<f64, Reject> {
@@ -183,25 +111,14 @@ impl Scene<'_> {
         Ok(())
     }
 
-    /// Square of the cosine between the bead and the gauge's axis at a place.
-    fn cosine_squared(&self, curves: &[Curve; 2], t: f64) -> f64 {
-        let slope = f64::midpoint(curves[0].slope(t), curves[1].slope(t)) / self.reach();
-        1.0 / (1.0 + slope * slope)
-    }
-
     fn check_width(&self, got_mm: f64) -> Result<(), Reject> {
-        let (min_mm, max_mm) = (self.gauge.width_range.0.get(), self.gauge.width_range.1.get());
+        let range = self.gauge.width_range;
+        let (min_mm, max_mm) = (range.min.get(), range.max.get());
         if (min_mm..=max_mm).contains(&got_mm) {
             Ok(())
         } else {
             Err(Reject::WidthOutOfRange { got_mm, min_mm, max_mm })
         }
-    }
-
-    /// The point of an edge on the surface.
-    fn on_surface(&self, curve: &Curve, t: f64) -> Option<SurfacePoint> {
-        let v = self.centre() + t * self.reach();
-        self.surface.to_mm(self.view.to_image(curve.at(t), v))
     }
 
     /// How far each place lies off the course of its edge \[px\].

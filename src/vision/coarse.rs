@@ -3,6 +3,7 @@
 //! whole gauge (a Radon transform of the step response). Texture averages out;
 //! an edge does not.
 
+use super::gauge::WidthRangePx;
 use super::pair::{RIVAL_SHARE, SEAM_SHARE, is_narrower};
 use super::strip::{Grey, Strip};
 use crate::numeric::number::{single, whole};
@@ -120,7 +121,7 @@ impl Coarse {
     /// beside a bright one, its far side adds to the edge.
     pub fn pairs(
         &self,
-        width_px: (f32, f32),
+        range: WidthRangePx,
         polarities: [bool; 2],
         may_be_groove: bool,
         out: &mut Vec<LinePair>,
@@ -137,7 +138,7 @@ impl Coarse {
             for &left in lefts {
                 for &right in rights {
                     let width = right.at - left.at;
-                    if width < width_px.0 || width > width_px.1 {
+                    if width < range.min || width > range.max {
                         continue;
                     }
                     let apart = (left.slope - right.slope) / SLOPE_DIFFERENCE;

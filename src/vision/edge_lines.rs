@@ -15,6 +15,7 @@ use crate::core::units::Mm;
 use super::gauge::{Axis, Gauge, Polarity};
 use super::reject::Reject;
 use super::width::{Hints, WidthMeasurement};
+use crate::core::units::WidthRange;
 
 /// What rounding to whole pixels leaves in the distance of two lines \[px\].
 const SIGMA_PX: f64 = 0.5;
@@ -159,7 +160,7 @@ fn best_pair(
             let m1 = surface.to_mm(point(gauge, left.middle(), middle))?;
             let m2 = surface.to_mm(point(gauge, right.middle(), middle))?;
             let width = (m2 - m1).norm();
-            let (min, max) = gauge.width_range;
+            let WidthRange { min, max } = gauge.width_range;
             if !(min.get()..=max.get()).contains(&width)
                 || !polarity_fits(gauge, frame, &grey, *left, *right)
             {
@@ -232,7 +233,7 @@ mod tests {
                 Roi { x: 10, y: 5, width: 140, height: 90 },
                 Axis::Vertical,
                 Polarity::Bright,
-                (Mm::constant(2.0), Mm::constant(20.0)),
+                WidthRange { min: Mm::constant(2.0), max: Mm::constant(20.0) },
             )
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::calibration::SurfaceMap;
 use crate::core::geometry::{ImagePoint, Roi};
-use crate::core::units::Mm;
+use crate::core::units::{Mm, WidthRange};
 
 /// How the bead runs in the image, to within 20 degrees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,6 +55,15 @@ pub const MIN_CONTRAST_GREY: f64 = 6.0;
 /// of the width: tolerances of printed beads are 5 % and more.
 pub const MAX_SIGMA: f64 = 0.02;
 
+/// Widths of a bead in pixels across the gauge's middle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WidthRangePx {
+    /// The narrowest \[px\].
+    pub min: f32,
+    /// The widest \[px\].
+    pub max: f32,
+}
+
 /// The gauge: region, orientation and expectations of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gauge {
@@ -64,8 +73,8 @@ pub struct Gauge {
     pub axis: Axis,
     /// The bead against its surroundings.
     pub polarity: Polarity,
-    /// Narrowest and widest bead that is plausible.
-    pub width_range: (Mm, Mm),
+    /// Widths that are plausible.
+    pub width_range: WidthRange,
     /// How edges are found.
     pub method: Method,
     /// Number of caliper lines along the region.
@@ -85,7 +94,7 @@ pub struct Gauge {
 
 impl Gauge {
     /// A gauge with the cell file's defaults for everything else.
-    pub fn new(roi: Roi, axis: Axis, polarity: Polarity, width_range: (Mm, Mm)) -> Self {
+    pub fn new(roi: Roi, axis: Axis, polarity: Polarity, width_range: WidthRange) -> Self {
         Self {
             roi,
             axis,
@@ -127,7 +136,7 @@ mod tests {
     #[test]
     fn a_gauge_is_as_long_as_its_rows_or_its_columns() {
         let roi = Roi { x: 10, y: 20, width: 100, height: 50 };
-        let range = (Mm::ZERO, Mm::constant(50.0));
+        let range = WidthRange { min: Mm::ZERO, max: Mm::constant(50.0) };
         let gauge = |axis| Gauge::new(roi, axis, Polarity::Bright, range);
         let map = SurfaceMap::from_scale(0.1);
         let length = |axis| gauge(axis).length_on(&map).unwrap().get();

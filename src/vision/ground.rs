@@ -1,6 +1,7 @@
 //! The pattern of what lies beside an edge, ground or bead: how strong it is, and how far
 //! it may move the mean of the edge.
 
+use super::row_range::RowRange;
 use super::strip::{Grey, Strip};
 use crate::numeric::number::{float, narrow, whole};
 use crate::numeric::rank;
@@ -15,7 +16,7 @@ const COLUMNS: usize = 10;
 const LEAST_LINES: usize = 8;
 /// Part of the noise's variance by which a pattern's must exceed it: less is not told
 /// from noise.
-const TOLD: f64 = 0.25;
+pub const TOLD: f64 = 0.25;
 
 /// Variance of all pixels in that of the noise up to which they show nothing but noise:
 /// there is no need of medians.
@@ -24,8 +25,8 @@ const SURELY_NOISE: f64 = 1.1;
 /// Where an edge lies on some rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
-    /// First row along the bead, and the one after the last.
-    pub rows: (usize, usize),
+    /// The rows.
+    pub rows: RowRange,
     /// Position across it \[px\].
     pub at: f64,
 }
@@ -150,7 +151,7 @@ impl Ground {
         self.columns = (0..COLUMNS).take_while(fits).count();
         self.lines.clear();
         self.lines.extend(side.places.iter().map(|place| {
-            let pixels = strip.row(usize::midpoint(place.rows.0, place.rows.1 - 1));
+            let pixels = strip.row(usize::midpoint(place.rows.first, place.rows.end - 1));
             let nearest = whole(narrow(place.at + side.outwards * first));
             std::array::from_fn(|column| {
                 let off = STEP_PX * column;

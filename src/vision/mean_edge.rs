@@ -9,27 +9,30 @@
 //! far a pattern moves the edge is read from the ground and the bead themselves: the same
 //! weights, held against places where there is no edge.
 
+mod column;
+mod course;
+mod descent;
+mod mean_edge_input;
 mod weights;
 
 use super::coarse::StepLine;
+use super::edge_windows::PLENTY;
+use super::located::Located;
 use super::rough::RoughFit;
-use super::sheet::PLENTY;
-use super::strip::{Grey, Strip};
-use super::trace::Located;
+use super::row_range::RowRange;
+use super::strip::Grey;
 use super::vectors;
 use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::{float, floor, narrow, whole};
+use crate::numeric::number::{float, narrow, whole};
 use crate::numeric::rank;
-use weights::{Samples, Weights, product};
+use column::Column;
+use course::{Bent, bend_at};
+use descent::{Descent, Goal, LONGEST_PX, MAX_STEPS, NEAR, TO_THE_END};
+pub use mean_edge_input::Scene;
+use weights::{HALF_PX, Samples, WINDOW, Weights, product};
 
-/// Half of the window about an edge \[px\]: longer than a pattern of usual size, so that
-/// the ground's level is that beside the edge.
-const HALF_PX: usize = 12;
-/// The same at least, and at most as a fraction of the bead's width.
-const MIN_HALF_PX: usize = 5;
+/// Half of the window about an edge at most, as a fraction of the bead's width.
 const HALF_FRACTION: f32 = 0.4;
-/// Pixels of the longest window.
-const WINDOW: usize = 2 * HALF_PX + 1;
 /// Blurs that are tried \[px\]: a lens's, up to the roughness of a torn edge. A wrong one
 /// does not move an edge in the middle of its window; it only lets in more noise.
 pub const BLURS_PX: [f64; 7] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0];
@@ -37,10 +40,6 @@ pub const BLURS_PX: [f64; 7] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0];
 const USUAL_BLUR: usize = 3;
 /// How far from each other edges of different blurs rest in a profile \[px\].
 const NEAR_PX: usize = 4;
-/// Steps of the descent, the longest of them and the last \[px\].
-const MAX_STEPS: usize = 12;
-const LONGEST_PX: f64 = 1.5;
-const LAST_PX: f64 = 1e-3;
 /// How far an edge may lie from its line \[px\].
 const FARTHEST_PX: f64 = 10.0;
 /// How many standard deviations of what the pattern bends an edge by are a bend of the
@@ -56,82 +55,6 @@ const LEVEL_PX: usize = 24;
 /// Columns of the ground that tell its pattern, and their distance \[px\].
 const MIN_COLUMNS: usize = 6;
 const COLUMN_PX: usize = 2;
-
-/// What is looked at.
-#[derive(Debug, Clone, Copy)]
-pub struct Scene<'a, T> {
-    /// The gauge's pixels.
-    pub strip: &'a Strip<'a, T>,
-    /// Its caliper lines: first row and the row after the last of each.
-    pub lines: &'a [(usize, usize)],
-    /// Distance of the two edges \[px\].
-    pub width_px: f32,
-    /// Whether the bead lies after the edge.
-    pub bead_after: bool,
-    /// Whether the bead is brighter than what lies outside.
-    pub bright: bool,
-}
-
-impl<T: Grey> Scene<'_, T> {
-    /// Last column.
-    fn last(&self) -> f64 {
-        float(self.strip.across - 1)
-    }
-
-    /// Where a row lies along the gauge: from −1 to 1.
-    fn place(&self, row: usize) -> f64 {
-        let half = 0.5 * float(self.strip.along);
-        (float(row) + 0.5 - half) / half
-    }
-
-    /// Reads pixels of a row from the one at or before a position on; returns how far the
-    /// position lies from that towards the next one. Beyond the gauge its last pixel goes on.
-    #[inline(always)]
-    fn fetch(&self, row: usize, from: f64, out: &mut [f32]) -> f32 {
-        let pixels = self.strip.row(row);
-        let of = |pixel: T| T::float(pixel.add_to(T::Sum::default()));
-        let first = floor(from);
-        let start = usize::try_from(first).ok();
-        if let Some(inside) = start.and_then(|start| pixels.get(start..start + out.len())) {
-            out.iter_mut().zip(inside).for_each(|(out, pixel)| *out = of(*pixel));
-        } else {
-            for (out, at) in out.iter_mut().zip(first..) {
-                *out = of(self.strip.nearest(row, at));
-            }
-        }
-        narrow(from - from.floor())
-    }
-
-    /// Sign by which a bright bead's grey levels and a dark one's are higher than the ground's.
-    fn sign(&self) -> f64 {
-        if self.bright { 1.0 } else { -1.0 }
-    }
-
-    /// Direction from the edge into the bead.
-    fn inwards(&self) -> f64 {
-        if self.bead_after { 1.0 } else { -1.0 }
-    }
-}
-
-/// A course along the gauge: its mean position, and half of what it moves by from end to
-/// end \[px\]; the bend is a parabola's with a mean of zero.
-#[derive(Debug, Clone, Copy, Default)]
-struct Bent {
-    at: f64,
-    tilt: f64,
-    bend: f64,
-}
-
-impl Bent {
-    fn at(&self, place: f64) -> f64 {
-        self.at + self.tilt * place + self.bend * bend_at(place)
-    }
-}
-
-/// A parabola from −1 to 1 whose mean is zero.
-fn bend_at(place: f64) -> f64 {
-    place * place - 1.0 / 3.0
-}
 
 /// An edge along a course; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
@@ -378,7 +301,7 @@ impl MeanEdge {
             place[..weights.pixels].reverse();
         }
         let per_grey = scene.sign() * f64::from(scene.strip.scale) / found.step;
-        for &(from, to) in scene.lines {
+        for &RowRange { first: from, end: to } in scene.lines {
             let (mut aside, mut middle) = (0.0, 0.0);
             for row in from..to {
                 let at = self.course.at(scene.place(row));
@@ -410,30 +333,6 @@ struct Beside {
     bead: Profiles,
 }
 
-/// Where a descent ends.
-#[derive(Debug, Clone, Copy)]
-struct Goal {
-    /// Last step \[px\].
-    last_px: f64,
-    /// Whether the course may bend.
-    bends: bool,
-}
-
-const TO_THE_END: Goal = Goal { last_px: LAST_PX, bends: false };
-/// Where the edge is told from none, and the rest is left to another blur.
-const NEAR: Goal = Goal { last_px: 20.0 * LAST_PX, bends: false };
-
-/// Where a descent ended.
-#[derive(Debug, Clone, Copy)]
-struct Descent {
-    /// Step from the ground to the bead in the window \[grey levels\].
-    step: f64,
-    /// Level of the ground in the window \[grey levels\].
-    ground: f64,
-    /// Bend that is left \[px\].
-    bend: f64,
-}
-
 /// Adds the values between the pixels of a row to sums, with the row's shares of them.
 #[inline(always)]
 fn add_row(sums: &mut [Vec<f32>; 3], pixels: &[f32], between: f32, shares: [f32; 3]) {
@@ -449,29 +348,4 @@ fn add_row(sums: &mut [Vec<f32>; 3], pixels: &[f32], between: f32, shares: [f32;
 
 fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / float(values.len()))
-}
-
-/// Sums over the pixels of a column.
-#[derive(Debug, Clone, Copy, Default)]
-struct Column {
-    sum: f64,
-    squares: f64,
-    /// Of values times their places about the middle row.
-    across: f64,
-}
-
-impl Column {
-    fn add(&mut self, place: f64, value: f64) {
-        self.sum += value;
-        self.squares += value * value;
-        self.across += place * value;
-    }
-
-    /// Variance of the values of so many rows about the straight line through them.
-    fn variance_about_line(&self, rows: usize) -> f64 {
-        let count = float(rows);
-        let along = count * (count * count - 1.0) / 12.0;
-        let square = self.squares - self.sum * self.sum / count;
-        (square - self.across * self.across / along).max(0.0) / (count - 2.0).max(1.0)
-    }
 }

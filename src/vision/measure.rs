@@ -1,39 +1,34 @@
 //! One frame after the other: bands, candidates, contours, sub-pixel edges,
 //! width.
 
-mod choice;
+mod checks;
 mod compressed;
-mod even;
-mod judge;
 mod locate;
+mod model_selection;
+mod pattern_limits;
 mod patterned;
-mod rough;
+mod rough_edges;
 mod search;
-mod skew;
+mod skew_offset;
 #[cfg(test)]
 mod tests;
+mod uniformity;
+mod work;
 
 use crate::calibration::SurfaceMap;
 use crate::core::frame::Frame;
 use crate::core::geometry::ImagePoint;
-use judge::{WIDEST_BLUR_PX, WIDEST_MOTION_PX};
-use patterned::STRONGEST_BESIDE_WHOLE;
-use rough::may_be_rough;
+use checks::{WIDEST_BLUR_PX, WIDEST_MOTION_PX};
+use pattern_limits::STRONGEST_BESIDE_WHOLE;
+use rough_edges::may_be_rough;
+use work::{Way, Work};
 
 use super::axis;
-use super::coarse::{Coarse, LinePair};
-use super::contour::Contours;
-use super::edge::Candidates;
 use super::edge_lines;
-use super::gauge::{Gauge, Method};
-use super::ground::{Ground, Place};
-use super::mean_edge::MeanEdge;
-use super::motion::BlurShapes;
-use super::noise::PixelNoise;
-use super::parallel::Parallel;
-use super::pool::{self, Bands};
+use super::gauge::{Gauge, Method, WidthRangePx};
+use super::pixel_noise::PixelNoise;
+use super::pool;
 use super::reject::Reject;
-use super::rough::RoughEdge;
 use super::roughness::{CaliperFilter, LocalWidths};
 use super::strip::{Grey, Strip, Strips, Turner, View};
 use super::trace::Tracer;
@@ -41,10 +36,6 @@ use super::vectors;
 use super::width::{Caliper, EdgePlace, Edges, Hints, WidthMeasurement};
 use crate::numeric::number::float;
 
-/// Share of the caliper lines that must show each of the two edges.
-const NEED_SHARE: f64 = 0.6;
-/// Least deviation from its neighbours that makes a caliper an outlier \[px\].
-const OFF_PX: f64 = 0.3;
 /// Standard deviation of a width of [`NARROWEST_BLURS`] blurs from the flanks' overlap, in
 /// blurs, and the blurs by which a width must be larger for 1/e of it.
 const OVERLAP: f64 = 0.045;
@@ -60,97 +51,11 @@ pub struct Measurer {
     work: Work,
 }
 
-/// How edges were located.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Way {
-    /// As blurred steps, all rows together.
-    Steps,
-    /// From what is seen below the end of the scale.
-    CutOff,
-    /// Line by line.
-    Lines,
-}
-
-/// What a measurement works on.
-#[derive(Debug, Clone)]
-struct Work {
-    gauge: Gauge,
-    blur_shapes: BlurShapes,
-    bands: Bands,
-    lines: Vec<(usize, usize)>,
-    noise: PixelNoise,
-    /// Scale across the gauge's middle.
-    mm_per_px: f64,
-    width_px: f32,
-    memory: Vec<f32>,
-    response: Vec<i16>,
-    candidates: Vec<Candidates>,
-    ups: Contours,
-    downs: Contours,
-    parallel: Parallel,
-    coarse: Coarse,
-    pairs: Vec<LinePair>,
-    rough: [RoughEdge; 2],
-    mean_edges: [MeanEdge; 2],
-    left: Tracer,
-    right: Tracer,
-    least_off_px: f64,
-    is_lost: bool,
-    way: Way,
-    /// Whether a narrow groove may lie beside an edge.
-    is_beside_groove: bool,
-    /// Standard deviation of the pattern that the ground has on both sides, as a
-    /// fraction of the contrast; 0 where one side has none.
-    pattern_share: f64,
-    contrasts: [f64; 2],
-    scatter: Vec<f64>,
-    middles: Vec<f64>,
-    places: Vec<Place>,
-    ground: Ground,
-    axis: axis::Memory,
-    left_px: Vec<ImagePoint>,
-    right_px: Vec<ImagePoint>,
-}
-
 impl Measurer {
     /// For a gauge. `white` is the upper end of the camera's scale where it is
     /// not that of the pixels, as with 12 bits in 16.
     pub fn new(gauge: Gauge, white: Option<u16>) -> Self {
-        let work = Work {
-            gauge,
-            blur_shapes: BlurShapes::default(),
-            bands: Bands::default(),
-            lines: Vec::new(),
-            noise: PixelNoise::default(),
-            mm_per_px: 0.0,
-            width_px: 0.0,
-            memory: Vec::new(),
-            response: Vec::new(),
-            candidates: Vec::new(),
-            ups: Contours::default(),
-            downs: Contours::default(),
-            parallel: Parallel::default(),
-            coarse: Coarse::default(),
-            pairs: Vec::new(),
-            rough: Default::default(),
-            mean_edges: Default::default(),
-            left: Tracer::default(),
-            right: Tracer::default(),
-            least_off_px: OFF_PX,
-            is_lost: false,
-            way: Way::Steps,
-            is_beside_groove: false,
-            pattern_share: 0.0,
-            contrasts: [0.0; 2],
-            scatter: Vec::new(),
-            middles: Vec::new(),
-            places: Vec::new(),
-            ground: Ground::default(),
-            axis: axis::Memory::default(),
-            left_px: Vec::new(),
-            right_px: Vec::new(),
-        };
-        Self { gauge, white, turner: Turner::new(gauge.gamma), work }
+        Self { gauge, white, turner: Turner::new(gauge.gamma), work: Work::new(gauge) }
     }
 
     /// The edges behind the last width, for pictures of them.
@@ -185,9 +90,15 @@ impl Measurer {
         let lines = self.work.lines.len();
         let along = View::new(self.gauge.roi, self.gauge.axis).along;
         let filter = CaliperFilter {
-            filter_px: self.work.left.along_px.max(self.work.right.along_px),
+            filter_px: self
+                .work
+                .left
+                .uncertainty
+                .along_px
+                .max(self.work.right.uncertainty.along_px),
             blur_px: measured.hints.blur_px,
-            noise_fractions: [&self.work.left, &self.work.right].map(|edge| edge.lines_fraction),
+            noise_fractions: [&self.work.left, &self.work.right]
+                .map(|edge| edge.uncertainty.lines_fraction),
             line_px: float(along) / float(lines.max(1)),
         };
         LocalWidths::read(self.calipers(), lines, filter, surface)
@@ -304,7 +215,7 @@ impl Work {
         &mut self,
         found: WidthMeasurement,
         strip: &Strip<'_, T>,
-        range: (f32, f32),
+        range: WidthRangePx,
         view: &View,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
@@ -335,7 +246,7 @@ impl Work {
     fn measure_steps<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
-        range: (f32, f32),
+        range: WidthRangePx,
         view: &View,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
@@ -361,7 +272,7 @@ impl Work {
             skew: None,
         };
         self.middles.clear();
-        self.middles.extend(self.lines.iter().map(|&line| pool::middle(line)));
+        self.middles.extend(self.lines.iter().map(|&line| line.middle()));
         for (tracer, points) in [(&self.left, &mut self.left_px), (&self.right, &mut self.right_px)]
         {
             let places = tracer.edges().iter().zip(&self.middles);
@@ -373,12 +284,13 @@ impl Work {
         let sides = [&self.left, &self.right].map(|tracer| {
             let of_compression = self.variance_of_compression(tracer, hints.contrast_grey);
             // What rows vary by, where that is known, has some of the compression in it.
-            let mean_variance = tracer.mean_variance.map(|known| known.max(of_compression));
+            let mean_variance =
+                tracer.uncertainty.mean_variance.map(|known| known.max(of_compression));
             let of_steps = if mean_variance.is_none() { of_compression } else { 0.0 };
             axis::Side {
                 places: tracer.edges(),
-                common_variance: tracer.common_variance
-                    + tracer.ground_variance
+                common_variance: tracer.uncertainty.common_variance
+                    + tracer.uncertainty.ground_variance
                     + 0.5 * skew_variance
                     + overlap_variance(width_px, tracer.blur_px)
                     + of_steps,

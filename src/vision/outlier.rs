@@ -1,6 +1,6 @@
 //! Calipers that disagree with their neighbours: grains, sparks, wrong picks.
 
-use super::trace::Located;
+use super::located::Located;
 use crate::numeric::rank;
 
 /// Distances at which neighbours are asked.

@@ -5,20 +5,25 @@
 
 use std::ops::Range;
 
+use super::edge_windows::Sheet;
 use super::phase::split;
-use super::sheet::Sheet;
 use crate::numeric::rank;
 
 mod curved;
 mod flank;
-mod groove;
+mod flank_skew;
+mod groove_check;
 mod linear;
+mod look;
 mod shape;
-mod skew;
 mod slopes;
+mod step;
+mod step_fit;
 
-pub use shape::{Extent, Look, Shading, Shape, Step};
-pub use skew::EdgeSkew;
+pub use flank_skew::EdgeSkew;
+pub use look::{Distances, Look};
+pub use shape::{Shading, Shape};
+pub use step::{Extent, Step};
 
 /// Rows that are laid over each other at most.
 const ROWS: usize = 100;

@@ -4,6 +4,7 @@
 //! weaker than the edges; where it is not, two pairs fit.
 
 use super::contour::{Contour, Contours};
+use super::gauge::WidthRangePx;
 use crate::numeric::rank;
 
 /// Depth of a gap between two edges, as a share of the weaker one, that shows them
@@ -20,13 +21,6 @@ const SAME_WIDTH: f32 = 0.03;
 const SAME_PX: f32 = 5.0;
 /// Share of the bands in which a gap is seen, in that of the bead's edges.
 const WHOLE: f64 = 0.85;
-
-/// What pairs are looked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Search {
-    /// Narrowest and widest pair \[px\].
-    pub width_px: (f32, f32),
-}
 
 /// The two edges of the bead among the contours, by their numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,11 +49,11 @@ pub struct Pair {
 pub fn find(
     lefts: &Contours,
     rights: &Contours,
-    search: Search,
+    range: WidthRangePx,
     memory: &mut Vec<f32>,
 ) -> Option<Pair> {
     let mut best: Option<Pair> = None;
-    each(lefts, rights, search, memory, |pair| {
+    each(lefts, rights, range, memory, |pair| {
         if best.is_none_or(|best| best.score < pair.score) {
             let sides = (&lefts.all()[pair.left], &rights.all()[pair.right]);
             let gap = gap(lefts, rights, sides) / weaker(sides);
@@ -70,7 +64,7 @@ pub fn find(
     });
     let best = best?;
     let mut rival: Option<Pair> = None;
-    each(lefts, rights, search, memory, |pair| {
+    each(lefts, rights, range, memory, |pair| {
         let (inner, outer) =
             if pair.width_px < best.width_px { (pair, best) } else { (best, pair) };
         let fits =
@@ -113,18 +107,18 @@ fn is_within(inner: &Pair, outer: &Pair, (lefts, rights): (&Contours, &Contours)
     narrower && (ends_within || begins_within)
 }
 
-/// All pairs whose width is within the search's range.
+/// All pairs whose width is within the range.
 fn each(
     lefts: &Contours,
     rights: &Contours,
-    search: Search,
+    range: WidthRangePx,
     memory: &mut Vec<f32>,
     mut visit: impl FnMut(Pair),
 ) {
     for (left, edge) in lefts.all().iter().enumerate() {
         for (right, other) in rights.all().iter().enumerate() {
             let Some(width_px) = distance(edge, other, memory) else { continue };
-            if width_px < search.width_px.0 || width_px > search.width_px.1 {
+            if width_px < range.min || width_px > range.max {
                 continue;
             }
             let step = (edge.step * other.step).sqrt();
@@ -210,13 +204,13 @@ mod tests {
         (up, down)
     }
 
-    fn width(bars: &(Contours, Contours), search: Search) -> Option<f32> {
+    fn width(bars: &(Contours, Contours), range: WidthRangePx) -> Option<f32> {
         let mut memory = Vec::new();
-        let pair = find(&bars.0, &bars.1, search, &mut memory)?;
+        let pair = find(&bars.0, &bars.1, range, &mut memory)?;
         distance(&bars.0.all()[pair.left], &bars.1.all()[pair.right], &mut memory)
     }
 
-    const WIDE: Search = Search { width_px: (10.0, 80.0) };
+    const WIDE: WidthRangePx = WidthRangePx { min: 10.0, max: 80.0 };
 
     #[test]
     fn two_beads_with_a_gap_are_as_likely_as_one_with_a_seam() {
@@ -224,7 +218,8 @@ mod tests {
         let mut memory = Vec::new();
         let both = find(&bars.0, &bars.1, WIDE, &mut memory).unwrap();
         assert!(both.rival_px.is_some(), "{both:?}");
-        let one = find(&bars.0, &bars.1, Search { width_px: (10.0, 40.0) }, &mut memory).unwrap();
+        let one =
+            find(&bars.0, &bars.1, WidthRangePx { min: 10.0, max: 40.0 }, &mut memory).unwrap();
         assert!((one.width_px - 25.0).abs() < 0.5 && one.rival_px.is_none(), "{one:?}");
     }
 
@@ -253,7 +248,7 @@ mod tests {
         assert!((strong.width_px - 60.0).abs() < 0.5, "{strong:?}");
         let rival = strong.rival_px.unwrap();
         assert!([20.0, 32.0].iter().any(|one: &f32| (rival - one).abs() < 0.5), "{strong:?}");
-        let range = Search { width_px: (45.0, 80.0) };
+        let range = WidthRangePx { min: 45.0, max: 80.0 };
         let bars = seamed(16);
         let alone = find(&bars.0, &bars.1, range, &mut memory).unwrap();
         assert!((alone.width_px - 60.0).abs() < 0.5 && alone.rival_px.is_none(), "{alone:?}");
@@ -269,6 +264,6 @@ mod tests {
     fn a_width_out_of_range_is_no_pair() {
         let bars = bars(&[(60, 100, 80)]);
         assert!((width(&bars, WIDE).unwrap() - 40.0).abs() < 0.5);
-        assert_eq!(width(&bars, Search { width_px: (50.0, 90.0) }), None);
+        assert_eq!(width(&bars, WidthRangePx { min: 50.0, max: 90.0 }), None);
     }
 }

@@ -38,7 +38,8 @@ impl Parallel {
     pub fn find<L, R>(
         &mut self,
         bands: usize,
-        (lefts, rights): (impl Fn(usize) -> L, impl Fn(usize) -> R),
+        lefts: impl Fn(usize) -> L,
+        rights: impl Fn(usize) -> R,
         range: std::ops::Range<f32>,
     ) -> bool
     where
@@ -140,7 +141,7 @@ mod tests {
             std::iter::once(covered).chain(true_one)
         };
         let mut parallel = Parallel::default();
-        assert!(parallel.find(24, (left, right), 80.0..140.0));
+        assert!(parallel.find(24, left, right, 80.0..140.0));
         for band in 0..24 {
             let (left, right) = (parallel.lefts()[band], parallel.rights()[band]);
             if band % 2 == 0 {
@@ -154,7 +155,7 @@ mod tests {
     fn a_few_steps_at_any_distance_are_no_bead() {
         let left = |band: usize| (band < 3).then_some(10.0).into_iter();
         let right = |_| std::iter::once(60.0);
-        assert!(!Parallel::default().find(24, (left, right), 40.0..60.0));
-        assert!(!Parallel::default().find(3, (left, right), 70.0..80.0));
+        assert!(!Parallel::default().find(24, left, right, 40.0..60.0));
+        assert!(!Parallel::default().find(3, left, right, 70.0..80.0));
     }
 }

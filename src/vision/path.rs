@@ -1,7 +1,8 @@
 //! Rough places and levels, one a band, made into smooth ones that every row
 //! can be held against.
 
-use super::pool::{Bands, middle};
+use super::pool::Bands;
+use super::row_range::RowRange;
 use crate::numeric::number::{narrow, single};
 use crate::numeric::rank;
 
@@ -160,6 +161,18 @@ pub struct Course {
     per_px: f32,
 }
 
+/// By how much an edge is other than it was expected.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Correction {
+    /// How far it lies aside \[px\].
+    pub aside: f32,
+    /// Its level before the step, beyond the one that was expected, as a fraction of the
+    /// step.
+    pub before: f32,
+    /// The same of the level after it, beyond the one before that was expected.
+    pub after: f32,
+}
+
 /// The course from the middle of a band to that of the next.
 #[derive(Debug, Clone, Copy)]
 struct Segment {
@@ -195,9 +208,8 @@ impl Course {
         self.link();
     }
 
-    /// Moves all of it aside and takes other levels: those before and after
-    /// the edge as shares of the step.
-    pub fn adopt(&mut self, aside: f32, (before, after): (f32, f32)) {
+    /// Moves all of it aside and takes other levels.
+    pub fn adopt(&mut self, Correction { aside, before, after }: Correction) {
         for [at, level, step] in &mut self.values {
             *at += aside;
             *level += before * *step;
@@ -208,15 +220,15 @@ impl Course {
 
     /// Draws the line anew through better places; levels stay. `memory` is
     /// scratch.
-    pub fn redraw(&mut self, lines: &[(usize, usize)], at: &[f32], memory: &mut Vec<[f32; 3]>) {
+    pub fn redraw(&mut self, lines: &[RowRange], at: &[f32], memory: &mut Vec<[f32; 3]>) {
         memory.clear();
         memory.extend(lines.iter().zip(at).map(|(&line, &at)| {
-            let [_, before, step] = self.at(narrow(middle(line)));
+            let [_, before, step] = self.at(narrow(line.middle()));
             [at, before, step]
         }));
         std::mem::swap(&mut self.values, memory);
         self.middles.clear();
-        self.middles.extend(lines.iter().map(|&line| narrow(middle(line))));
+        self.middles.extend(lines.iter().map(|&line| narrow(line.middle())));
         self.link();
     }
 

@@ -3,6 +3,7 @@
 //! sub-pixel position comes from all rows later, which are cut into caliper
 //! lines likewise.
 
+use super::row_range::RowRange;
 use super::strip::{Grey, Strip};
 
 /// Rows that a profile is the mean of: fewer are too noisy to tell a step
@@ -28,7 +29,7 @@ pub struct Bands {
     across: usize,
     shift: u32,
     unit: f32,
-    bounds: Vec<(usize, usize)>,
+    bounds: Vec<RowRange>,
     full: usize,
     pixels: usize,
 }
@@ -50,20 +51,20 @@ impl Bands {
         self.unit
     }
 
-    /// First row of a band and the row after its last, along the bead.
-    pub fn rows(&self, band: usize) -> (usize, usize) {
+    /// Rows of a band, along the bead.
+    pub fn rows(&self, band: usize) -> RowRange {
         self.bounds[band]
     }
 
     /// The band of a row.
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
     pub fn band_of(&self, row: f32) -> usize {
-        self.bounds.partition_point(|&(_, end)| end as f32 <= row).min(self.count() - 1)
+        self.bounds.partition_point(|rows| rows.end as f32 <= row).min(self.count() - 1)
     }
 
     /// Middle of a band along the bead \[px\].
     pub fn middle(&self, band: usize) -> f64 {
-        middle(self.bounds[band])
+        self.bounds[band].middle()
     }
 
     /// Share of the pixels at the upper end of the scale, from one row a band.
@@ -87,10 +88,9 @@ impl Bands {
         self.unit = 0.25 * strip.scale * coarse;
         self.full = 0;
         self.pixels = 0;
-        for (profile, &(from, to)) in self.profiles.chunks_exact_mut(strip.across).zip(&self.bounds)
-        {
+        for (profile, rows) in self.profiles.chunks_exact_mut(strip.across).zip(&self.bounds) {
             // Where there are fewer, some are taken twice.
-            let row = |k| strip.row(spread(k, from, to));
+            let row = |k| strip.row(spread(k, rows.first, rows.end));
             let rows = [row(0), row(1), row(2), row(3)];
             add_up(rows, self.shift, profile);
             self.full += count_full(rows[1], strip.white);
@@ -100,17 +100,11 @@ impl Bands {
 }
 
 /// Cuts rows into as many pieces as asked for, but none of fewer than a band
-/// needs: first row and the row after the last of each.
-pub fn cut(along: usize, pieces: usize, bounds: &mut Vec<(usize, usize)>) {
+/// needs.
+pub fn cut(along: usize, pieces: usize, bounds: &mut Vec<RowRange>) {
     let count = pieces.min(along / ROWS).max(1);
     bounds.clear();
-    bounds.extend((0..count).map(|k| (k * along / count, (k + 1) * along / count)));
-}
-
-/// Middle of a piece \[px\].
-#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
-pub fn middle((from, to): (usize, usize)) -> f64 {
-    (from + to - 1) as f64 / 2.0
+    bounds.extend((0..count).map(|k| RowRange::new(k * along / count, (k + 1) * along / count)));
 }
 
 /// The `k`-th of the rows that stand for a band, evenly spread and symmetric
@@ -163,7 +157,7 @@ mod tests {
         let mut bands = Bands::default();
         bands.pool(&strip, 64);
         assert_eq!(bands.count(), 2);
-        assert_eq!(bands.rows(1), (5, 10));
+        assert_eq!(bands.rows(1), RowRange::new(5, 10));
         assert_eq!(bands.middle(1), 7.0);
         assert_eq!(bands.unit(), 0.25);
         assert_eq!(bands.profile(1)[3], 4 * (8 * 4 + 11));

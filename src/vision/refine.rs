@@ -5,9 +5,9 @@
 
 use super::blur::Overlay;
 use super::fit::{Edge, EdgeFit, Prior, Window};
-use super::pool;
+use super::located::Located;
+use super::row_range::RowRange;
 use super::strip::{Grey, Strip};
-use super::trace::Located;
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::rank;
 
@@ -22,8 +22,8 @@ const MIN_HALF: usize = 4;
 pub struct Task<'a, T> {
     /// The gauge's pixels.
     pub strip: &'a Strip<'a, T>,
-    /// Its caliper lines: first row and the row after the last of each.
-    pub lines: &'a [(usize, usize)],
+    /// Rows of its caliper lines.
+    pub lines: &'a [RowRange],
     /// Room between the two edges of the bead \[px\], typical.
     pub width_px: f64,
 }
@@ -101,11 +101,10 @@ impl Refiner {
     }
 
     /// Slope of the rough edge about a band \[px across per px along\].
-    fn slope(&self, band: usize, lines: &[(usize, usize)]) -> f64 {
+    fn slope(&self, band: usize, lines: &[RowRange]) -> f64 {
         let from = band.saturating_sub(NEIGHBOURS);
         let to = (band + NEIGHBOURS + 1).min(self.rough.len());
-        let near =
-            || (from..to).filter_map(|k| self.rough[k].map(|at| (pool::middle(lines[k]), at)));
+        let near = || (from..to).filter_map(|k| self.rough[k].map(|at| (lines[k].middle(), at)));
         let (mut n, mut sum_v, mut sum_u) = (0.0, 0.0, 0.0);
         for (v, u) in near() {
             n += 1.0;
@@ -162,7 +161,7 @@ impl Refiner {
                 window.fit(table, start_levels(&window, at), None)
             });
             if let Some(fit) = fit {
-                let (from, to) = task.lines[band];
+                let RowRange { first: from, end: to } = task.lines[band];
                 #[expect(clippy::cast_precision_loss, reason = "windows are small")]
                 {
                     residual += fit.residual * (to - from) as f64;
@@ -198,7 +197,7 @@ impl Refiner {
         for (band, edge) in edges.iter_mut().enumerate() {
             *edge = None;
             let Some(alone) = self.first_fits[band] else { continue };
-            let (from, to) = task.lines[band];
+            let RowRange { first: from, end: to } = task.lines[band];
             #[expect(clippy::cast_precision_loss, reason = "a band has few rows")]
             let noise = self.noise_grey * self.noise_grey / (to - from) as f64;
             let prior = Prior {
@@ -246,8 +245,7 @@ impl Refiner {
                 n += 1.0;
             }
         }
-        // 0.455 is the median of the square of a standard normal number.
-        let total = rank::median(&mut scatter).unwrap_or(0.0) / 0.455;
+        let total = rank::median(&mut scatter).unwrap_or(0.0) / rank::MEDIAN_SQUARE;
         self.scatter = scatter;
         (total - explained / f64::max(n, 1.0)).max(0.0)
     }
@@ -268,8 +266,8 @@ fn read_window<T: Grey>(
     (at, slope): (f64, f64),
     window: &mut [f32],
 ) -> Option<f64> {
-    let (from, to) = task.lines[band];
-    let middle = pool::middle(task.lines[band]);
+    let RowRange { first: from, end: to } = task.lines[band];
+    let middle = task.lines[band].middle();
     let half = (window.len() / 2) as f64;
     let mut left_over = 0.0;
     for v in from..to {

@@ -6,30 +6,31 @@
 //! errors of the mean.
 //!
 //! ```text
-//! window    rows about the edge, turned so that the bead lies after it and is bright
-//! route     the course with the strongest step, by dynamic programming
-//! levels    grey of the bead and of what lies outside, along the route
-//! crossing  where each row passes from the one to the other
-//! noise     standard deviation of the mean position
+//! window          rows about the edge, turned so that the bead lies after it and is bright
+//! route           the course with the strongest step, by dynamic programming
+//! levels          grey of the bead and of what lies outside, along the route
+//! crossing        where each row passes from the one to the other
+//! position_noise  standard deviation of the mean position
 //! ```
 
 mod crossing;
 mod groove;
+mod kernel;
 mod levels;
-mod noise;
+mod position_noise;
+mod rough_input;
 mod route;
 mod window;
 
 use super::coarse::StepLine;
-use super::gauge::EdgeKind;
-use super::strip::{Grey, Strip};
-use super::trace::{self, Located};
-use crate::numeric::blurred_step::StepTable;
-use crate::numeric::number::{float, narrow, whole};
+use super::located::{self, Located};
+use super::strip::Grey;
+use crate::numeric::number::{float, narrow};
 use crossing::INSIDE_PX;
 pub use groove::Blur;
 use groove::EdgeShape;
 use levels::{Crossings, Levels, OUTSIDE};
+pub use rough_input::Scene;
 use route::Route;
 use window::{ALONG_PX, STRAIGHT_ROWS, Windows};
 
@@ -82,27 +83,6 @@ const SHIFT_FRACTION: f64 = 0.2;
 /// summed within the edge: a flank that is no blurred step lies farther.
 const MOST_OFF: f64 = 2.0;
 
-/// What is looked at.
-#[derive(Debug, Clone, Copy)]
-pub struct Scene<'a, T> {
-    /// The gauge's pixels.
-    pub strip: &'a Strip<'a, T>,
-    /// Its caliper lines: first row and the row after the last of each.
-    pub lines: &'a [(usize, usize)],
-    /// Standard deviation of a pixel's noise \[grey levels\].
-    pub noise: f32,
-    /// Distance of the two edges \[px\].
-    pub width_px: f32,
-    /// Whether the bead lies after the edge.
-    pub bead_after: bool,
-    /// Whether the bead is brighter than what lies outside.
-    pub bright: bool,
-    /// What the edge looks like.
-    pub edge: EdgeKind,
-    /// A step that the lens blurs.
-    pub table: &'a StepTable,
-}
-
 /// Finds one edge; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct RoughEdge {
@@ -147,6 +127,14 @@ pub struct RoughFit {
     pub lines_fraction: f64,
 }
 
+impl RoughFit {
+    /// Whether the odd pixels about the edge exceed those of the bead's texture by such a
+    /// share.
+    pub fn exceeds_texture(&self, by: f64) -> bool {
+        self.odd_share > self.odd_within_share + by
+    }
+}
+
 impl RoughEdge {
     /// Positions of the last frame, one a caliper line.
     pub fn lines(&self) -> &[Option<Located>] {
@@ -155,7 +143,7 @@ impl RoughEdge {
 
     /// Mean of the positions across the bead \[px\].
     pub fn middle(&self) -> f64 {
-        trace::middle(&self.lines)
+        located::middle(&self.lines)
     }
 
     /// Finds the edge near a line; `None` where no edge runs there.
@@ -172,14 +160,15 @@ impl RoughEdge {
             }
             self.route.follow(&self.crossings.at)?;
         }
-        self.variance = noise::of_profile(&self.levels)?;
+        self.variance = position_noise::of_profile(&self.levels)?;
         self.shape = self.fit_shape(UNKNOWN_BLUR, scene, None);
         Some(())
     }
 
     /// Blur of the edge that was found.
     pub fn blur(&self) -> Option<Blur> {
-        let fine = FINE_FRACTION * noise::fine_roughness(&self.crossings, self.windows.fine());
+        let fine =
+            FINE_FRACTION * position_noise::fine_roughness(&self.crossings, self.windows.fine());
         self.shape.map(|shape| {
             let Blur { px, variance } = shape.blur;
             let other = (SAME_BLUR * px).powi(2) + (0.5 * fine / px).powi(2);
@@ -201,7 +190,7 @@ impl RoughEdge {
         let known = other.filter(|blur| blur.variance < UNKNOWN_BLUR.variance);
         let shape = known.and_then(|blur| self.fit_shape(blur, scene, self.shape)).or(self.shape);
         let is_groove_likely = shape.is_some_and(|shape| shape.groove_share > LIKELY_GROOVE);
-        let noise = noise::of_mean(&self.windows, &self.levels, &self.crossings, scene)?;
+        let noise = position_noise::of_mean(&self.windows, &self.levels, &self.crossings, scene)?;
         // Where a rib or a shade lies within, only the level beside the edge is the bead's.
         let off = |shape: &EdgeShape| shape.at - float(OUTSIDE) - self.crossings.off_course;
         let contrast = self.levels.contrast();
@@ -212,7 +201,7 @@ impl RoughEdge {
         };
         let shaped = shape.filter(|shape| is_groove_likely || of_level(shape));
         let is_narrow = !on_ground && shape.is_some_and(|shape| shape.width() < NARROW_GROOVE_PX);
-        let waves = || noise::roughness(&self.crossings).sqrt();
+        let waves = || position_noise::roughness(&self.crossings).sqrt();
         let of_waves = if hides_depth {
             (GROOVE_WAVES * waves()).min(MOST_GROOVE_WAVES_PX).powi(2)
         } else if is_narrow {
@@ -256,8 +245,8 @@ impl RoughEdge {
             is_groove,
             is_narrow_groove: is_groove_likely,
             is_on_ground: on_ground,
-            odd_share: noise::mean_of(&self.crossings.odd),
-            odd_within_share: noise::mean_of(&self.crossings.odd_within),
+            odd_share: position_noise::mean_of(&self.crossings.odd),
+            odd_within_share: position_noise::mean_of(&self.crossings.odd_within),
             along_px: ALONG_PX,
             lines_fraction: noise.lines_fraction,
         })
@@ -275,7 +264,7 @@ impl RoughEdge {
             variance: self.variance,
             blur,
             edge: scene.edge,
-            roughness: noise::roughness(&self.crossings),
+            roughness: position_noise::roughness(&self.crossings),
             before,
         };
         groove::fit(self.levels.mean()?, &known)
@@ -309,13 +298,4 @@ impl RoughEdge {
             self.lines.push(located);
         }
     }
-}
-
-/// The Gaussian kernel of a standard deviation \[samples\], normalised, from its
-/// middle outwards; three standard deviations long.
-fn kernel(sigma: f64) -> Vec<f32> {
-    let half = whole(narrow(3.0 * sigma)).max(1);
-    let value = |k: usize| libm::exp(-0.5 * (float(k) / sigma).powi(2));
-    let sum = 2.0 * (0..=half).map(value).sum::<f64>() - value(0);
-    (0..=half).map(|k| narrow(value(k) / sum)).collect()
 }

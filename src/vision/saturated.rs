@@ -1,7 +1,7 @@
 //! A bead, or the ground beside it, that passes the upper end of the camera's
 //! scale.
 
-use super::noise;
+use super::pixel_noise;
 use super::reject::Reject;
 use super::strip::{Grey, Strip};
 use super::trace::{Scene, Tracer};
@@ -64,7 +64,7 @@ impl<T: Grey> Bead<'_, T> {
         let (mut square, mut n) = (0.0, 0.0);
         for columns in ranges.map(|range| columns(strip, range)) {
             if !columns.is_empty() {
-                square += noise::of(strip, columns).powi(2);
+                square += pixel_noise::of(strip, columns).powi(2);
                 n += 1.0;
             }
         }

@@ -11,6 +11,15 @@ const BELIEVED: f64 = 2.5;
 /// Places beyond the terms of their course that tell their scatter.
 const FEWEST_FREE: f64 = 3.0;
 
+/// A place off the course of its edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Offset {
+    /// Distance from the course \[px\].
+    pub px: f64,
+    /// Fraction of a band's rows that the place comes from.
+    pub share: f64,
+}
+
 /// By how much the variance of the mean of an edge's places is larger than
 /// that of independent ones: from what is left of them when a parabola through
 /// nine neighbours, the bead's own shape, is taken off, and from its
@@ -51,17 +60,16 @@ pub fn inflation(places: &[Option<f64>], variance: f64, memory: &mut Vec<f64>) -
 }
 
 /// The same of places with gaps between them, from their distances to the
-/// course that was fitted to them with so many terms \[px\], each with its share
-/// of a band's rows. What the bead's own shape leaves counts as an error too:
+/// course that was fitted to them with so many terms. What the bead's own shape leaves counts as an error too:
 /// the gaps hide as much of it.
 pub fn inflation_with_gaps(
-    places: impl Iterator<Item = (f64, f64)>,
+    places: impl Iterator<Item = Offset>,
     variance: f64,
     terms: usize,
 ) -> f64 {
     let (mut square, mut n) = (0.0, 0.0);
-    for (off, share) in places {
-        square += share * off * off;
+    for Offset { px, share } in places {
+        square += share * px * px;
         n += 1.0;
     }
     let free = n - float(terms);
@@ -149,7 +157,11 @@ mod tests {
         assert_eq!(inflation(&places(0), 1.0, &mut Vec::new()), None);
         let of = |seed, variance| {
             let places = places(seed);
-            inflation_with_gaps(places.iter().flatten().map(|&at| (at, 1.0)), variance, 2)
+            inflation_with_gaps(
+                places.iter().flatten().map(|&px| Offset { px, share: 1.0 }),
+                variance,
+                2,
+            )
         };
         let inflated = (0..200).filter(|&seed| of(seed, 1.0) > 1.0).count();
         assert!(inflated <= 8, "{inflated}");

@@ -4,7 +4,7 @@
 
 use std::sync::LazyLock;
 
-use super::overlay::Overlay;
+use super::overlay::{Distances, Overlay};
 use crate::numeric::number::float;
 
 /// Variance of the rows about an edge, in that of their noise, from which on
@@ -66,25 +66,25 @@ pub struct Texture {
 impl Texture {
     /// Reads it from windows laid over each other, `None` where there is no
     /// texture to speak of. `noise` is the variance of a pixel, all variances
-    /// are in squared shares of the step; `beside` are the stretches that are
-    /// free of the edge: nearest and farthest distance before it and after it
-    /// \[px\].
+    /// are in squared shares of the step; `beside` are the pixels that are free of
+    /// the edge, before it and after it.
     #[inline(always)]
-    pub fn read(overlay: &Overlay, noise: f64, beside: [(usize, usize); 2]) -> Option<Self> {
+    pub fn read(overlay: &Overlay, noise: f64, beside: [Distances; 2]) -> Option<Self> {
         let (rows, windows) = overlay.laid();
         let rows = rows / windows.max(1.0);
         let about_edge = rows * overlay.unlikeness();
         if about_edge < NOTABLE * noise {
             return None;
         }
-        Self::find(overlay, (rows, about_edge), noise, beside)
+        Self::find(overlay, rows, about_edge, noise, beside)
     }
 
     fn find(
         overlay: &Overlay,
-        (rows, about_edge): (f64, f64),
+        rows: f64,
+        about_edge: f64,
         noise: f64,
-        beside: [(usize, usize); 2],
+        beside: [Distances; 2],
     ) -> Option<Self> {
         let Covariances { all, sides } =
             covariances(overlay, beside, MANY_SIGMA * (about_edge / rows).sqrt())?;
@@ -177,13 +177,13 @@ fn shares(sides: [Option<f64>; 2]) -> [f64; 2] {
 }
 
 /// Covariances over all rows but those with a grain; `None` where there is too little room.
-fn covariances(overlay: &Overlay, beside: [(usize, usize); 2], limit: f64) -> Option<Covariances> {
+fn covariances(overlay: &Overlay, beside: [Distances; 2], limit: f64) -> Option<Covariances> {
     let mut sums = [0.0; LAGS + 1];
     let mut counts = [0.0; LAGS + 1];
     let mut sides = [None; 2];
     #[expect(clippy::cast_possible_truncation, reason = "a share of a step")]
     let limit = limit as f32;
-    for (side, (near, far)) in beside.into_iter().enumerate() {
+    for (side, Distances { near, far }) in beside.into_iter().enumerate() {
         let (sum_before, count_before) = (sums[0], counts[0]);
         let length = far.saturating_sub(near).min(MOST_ROOM);
         if length < LEAST_ROOM {

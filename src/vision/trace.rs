@@ -3,28 +3,32 @@
 //! held against it, and the rows of a band are solved for place and levels
 //! together.
 
+mod band_levels;
+mod band_sums;
 mod bands;
-mod hidden;
-mod levels;
+mod clipped;
+mod group;
+mod occlusion;
+mod parts;
 mod rows;
-mod uncover;
 mod winding;
 
-use super::cut_off::CutOff;
+use super::blur_estimate::BlurEstimate;
+use super::clipped_step::CutOff;
+use super::edge_windows::{Grouping, Sheet};
 use super::light::Surroundings;
+use super::located::{self, Located};
 use super::overlay::{EdgeSkew, Extent, Look, Overlay, REACH, Shape, Step};
-use super::path::{self, Course};
-use super::pool::{self, Bands};
+use super::path::{self, Correction, Course};
+use super::pool::Bands;
 use super::refine::{Refiner, Task};
 use super::rough::RoughFit;
-use super::sheet::Sheet;
+use super::row_range::RowRange;
 use super::strip::{Grey, Strip};
-use super::template::textured::Scatter;
-use super::template::{PlainSums, Template};
 use super::texture::Texture;
-use super::whiten::Whitener;
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::{float, narrow};
+use parts::{BandValues, Occlusion, RowFit, Scratch, State, Textured, Uncertainty, Winding};
 
 /// Passes over the rows at most; a second one is made only where the first
 /// path was off by a good part of the blur.
@@ -45,19 +49,6 @@ const COVERED_SHARE: f64 = 0.03;
 /// step at all.
 const CLEAR_FIT: f64 = 1.25;
 
-/// A caliper's edge with sub-pixel position.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Located {
-    /// Position across the bead at the middle of the band \[px\].
-    pub at: f64,
-    /// Variance of the position \[px²\].
-    pub variance: f64,
-    /// Signed height of the step \[grey levels\].
-    pub height: f64,
-    /// Share of the band's rows that it comes from.
-    pub share: f64,
-}
-
 /// What is looked at.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<'a, T> {
@@ -65,8 +56,8 @@ pub struct Scene<'a, T> {
     pub strip: &'a Strip<'a, T>,
     /// Its bands.
     pub bands: &'a Bands,
-    /// Its caliper lines: first row and the row after the last of each.
-    pub lines: &'a [(usize, usize)],
+    /// Rows of its caliper lines.
+    pub lines: &'a [RowRange],
     /// Noise of a pixel \[grey levels\].
     pub noise: f32,
     /// Room between the two edges of the bead \[px\], at its narrowest.
@@ -75,69 +66,30 @@ pub struct Scene<'a, T> {
     pub bead_after: bool,
 }
 
-/// What is known of an edge.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-enum State {
-    /// Nothing yet.
-    #[default]
-    Unseen,
-    /// Nothing covers it, as far as it shows.
-    Open,
-    /// It is covered in part, and located from its clear rows alone.
-    Covered,
-    /// It seems to be covered, but no clear rows were found: it is located as if
-    /// it were open.
-    Hidden,
-}
-
 /// Traces one edge of the bead; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct Tracer {
-    picked: Vec<f32>,
-    rough: Vec<f32>,
-    path: Vec<f32>,
-    before: Vec<f32>,
-    step: Vec<f32>,
+    values: BandValues,
     course: Course,
     /// A course along bands with levels that were picked anew.
     levels: Course,
-    /// Whether the course was picked from line to line.
-    winds: bool,
-    /// How far bands lie off the line between their neighbours; more than 1 where the
-    /// edge winds between them.
-    winding: f32,
-    groups: Vec<rows::Group>,
+    winding: Winding,
     sheet: Sheet,
     overlay: Overlay,
     seen: Option<Look>,
     /// What was read of the edge, and how far aside of the course it was \[px\].
     shape: Option<Shape>,
     aside_px: f64,
-    texture: Option<Texture>,
-    whitener: Whitener,
-    scatter_in_texture: Option<Scatter>,
-    template: Template,
-    plain: Vec<PlainSums>,
-    sorted: Vec<f32>,
-    solved: Vec<bands::BandSums>,
-    memory: Vec<[f32; 3]>,
-    scatter: Vec<f64>,
-    edges: Vec<Option<Located>>,
+    textured: Textured,
+    row_fit: RowFit,
+    occlusion: Occlusion,
     refiner: Refiner,
-    /// Rough places that are free to agree, and those of the best course yet.
-    free: Vec<f32>,
-    best_free: Vec<f32>,
-    /// Bands that agree with most of the others.
-    trusted: Vec<bool>,
-    /// Groups that show the edge and nothing else; none where that is not
-    /// asked.
-    clear: Vec<bool>,
-    /// Whether rows are sorted by that, each for itself.
-    sort_rows: bool,
+    cut_off: CutOff,
+    scratch: Scratch,
+    edges: Vec<Option<Located>>,
+    state: State,
     /// Share of the rows that did not fit.
     unfit: f64,
-    state: State,
-    cut_off: CutOff,
     /// What a row in the median leaves of the step that it is held against, in
     /// standard deviations of its noise; about 1 where the edge is one.
     pub misfit: f64,
@@ -147,20 +99,8 @@ pub struct Tracer {
     pub blur_px: f64,
     /// Whether ground lies beside it, no groove.
     pub is_on_ground: bool,
-    /// Variance of the whole edge's position that all places share, from
-    /// shading that is not known better \[px²\].
-    pub common_variance: f64,
-    /// Variance of the mean position, where it is known apart from that of the
-    /// places \[px²\].
-    pub mean_variance: Option<f64>,
-    /// Variance of the whole edge's position from the pattern beside the bead \[px²\].
-    pub ground_variance: f64,
-    /// Standard deviation of the smoothing along the bead that places have passed,
-    /// beside the mean over a line's rows \[px\].
-    pub along_px: f64,
-    /// Fraction of the places' variance that differs from place to place; the rest moves
-    /// the whole edge.
-    pub lines_fraction: f64,
+    /// How sure its places are, beside what each says.
+    pub uncertainty: Uncertainty,
 }
 
 impl Tracer {
@@ -169,8 +109,10 @@ impl Tracer {
         self.edges.clear();
         self.edges.extend_from_slice(places);
         self.blur_px = fit.blur_px;
-        (self.common_variance, self.mean_variance) = (0.0, Some(fit.variance));
-        (self.along_px, self.lines_fraction) = (fit.along_px, fit.lines_fraction);
+        (self.uncertainty.common_variance, self.uncertainty.mean_variance) =
+            (0.0, Some(fit.variance));
+        (self.uncertainty.along_px, self.uncertainty.lines_fraction) =
+            (fit.along_px, fit.lines_fraction);
         self.misfit = f64::INFINITY;
         self.state = State::Open;
         self.is_on_ground = fit.is_on_ground && !fit.is_groove;
@@ -194,7 +136,7 @@ impl Tracer {
 
     /// Mean of the edges' places across the bead \[px\].
     pub fn middle(&self) -> f64 {
-        middle(&self.edges)
+        located::middle(&self.edges)
     }
 
     /// The edges, for those who sort out outliers.
@@ -236,27 +178,30 @@ impl Tracer {
         self.course.at(narrow(v))[0]
     }
 
-    /// Looks at the edge along rough places, one a band: its blur and how sure
-    /// that is \[px\]. `None` where there is no edge.
+    /// Looks at the edge along rough places, one a band: its blur. `None` where there is no edge.
     #[inline(always)]
     pub fn look<T: Grey>(
         &mut self,
         table: &StepTable,
         scene: &Scene<'_, T>,
         rough: impl Iterator<Item = Option<f32>>,
-    ) -> Option<(f64, f64)> {
+    ) -> Option<BlurEstimate> {
         self.edges.clear();
-        (self.mean_variance, self.along_px, self.lines_fraction) = (None, 0.0, 1.0);
+        (
+            self.uncertainty.mean_variance,
+            self.uncertainty.along_px,
+            self.uncertainty.lines_fraction,
+        ) = (None, 0.0, 1.0);
         self.is_on_ground = true;
         self.seen = None;
-        self.path.clear();
+        self.values.path.clear();
         self.state = State::Unseen;
         self.misfit = f64::INFINITY;
-        (self.sort_rows, self.unfit) = (false, 0.0);
-        (self.winds, self.winding) = (false, 0.0);
-        self.clear.clear();
-        self.picked.clear();
-        self.picked.extend(rough.map(|at| at.unwrap_or(f32::NAN)));
+        (self.occlusion.sort_rows, self.unfit) = (false, 0.0);
+        (self.winding.is_followed, self.winding.excess) = (false, 0.0);
+        self.occlusion.clear.clear();
+        self.values.picked.clear();
+        self.values.picked.extend(rough.map(|at| at.unwrap_or(f32::NAN)));
         if !self.take_picked(scene) {
             return None;
         }
@@ -266,10 +211,14 @@ impl Tracer {
 
     /// Lays the rows over each other along the course and looks at what they show.
     #[inline(always)]
-    fn lay_over<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> Option<(f64, f64)> {
+    fn lay_over<T: Grey>(
+        &mut self,
+        table: &StepTable,
+        scene: &Scene<'_, T>,
+    ) -> Option<BlurEstimate> {
         self.read(scene);
         self.overlay.lay(&self.sheet);
-        let noise = f64::from(scene.noise) / f64::from(typical(&self.step).abs());
+        let noise = f64::from(scene.noise) / f64::from(typical(&self.values.step).abs());
         self.seen = self.overlay.look(table, noise, self.room(scene));
         self.look_for_texture(scene, noise);
         self.seen.as_ref().map(Look::blur)
@@ -277,7 +226,7 @@ impl Tracer {
 
     /// Whether the edge was located with weights that know the texture beside it.
     pub fn knows_texture(&self) -> bool {
-        self.texture.is_some()
+        self.textured.texture.is_some()
     }
 
     /// What was seen of the edge.
@@ -323,27 +272,26 @@ impl Tracer {
     /// the levels beside it. Returns whether there is any.
     #[inline(always)]
     fn take_picked<T: Grey>(&mut self, scene: &Scene<'_, T>) -> bool {
-        let rough = self.picked.iter().map(|at| at.is_finite().then_some(*at));
-        if !path::fill(rough, &mut self.rough) {
+        let rough = self.values.picked.iter().map(|at| at.is_finite().then_some(*at));
+        if !path::fill(rough, &mut self.scratch.rough) {
             return false;
         }
-        path::take_out_wild(&mut self.rough, &mut self.sorted);
-        let rest = self.rough.iter().map(|at| at.is_finite().then_some(*at));
-        if !path::fill(rest, &mut self.path) {
+        path::take_out_wild(&mut self.scratch.rough, &mut self.scratch.sorted);
+        let rest = self.scratch.rough.iter().map(|at| at.is_finite().then_some(*at));
+        if !path::fill(rest, &mut self.values.path) {
             return false;
         }
-        path::median_of_three(&mut self.path);
-        path::smooth_bent(&mut self.path, &mut self.rough);
-        std::mem::swap(&mut self.rough, &mut self.path);
+        path::median_of_three(&mut self.values.path);
+        path::smooth_bent(&mut self.values.path, &mut self.scratch.rough);
+        std::mem::swap(&mut self.scratch.rough, &mut self.values.path);
         self.pick_levels(scene);
-        self.course.draw(scene.bands, &self.path, &self.before, &self.step);
+        self.course.draw(scene.bands, &self.values.path, &self.values.before, &self.values.step);
         true
     }
 
-    /// Reads the shape of the edge that was looked at, with what is known of its blur: mean
-    /// and standard deviation \[px\].
+    /// Reads the shape of the edge that was looked at, with what is known of its blur.
     #[inline(always)]
-    pub fn take_shape(&mut self, table: &StepTable, blur: (f64, f64)) {
+    pub fn take_shape(&mut self, table: &StepTable, blur: BlurEstimate) {
         self.shape = None;
         let Some(seen) = &self.seen else { return };
         let Some(shape) = self.overlay.shape(table, seen, blur) else { return };
@@ -354,7 +302,8 @@ impl Tracer {
     /// The levels that were picked before and after the edge: means over the bands
     /// \[grey levels\].
     pub fn levels(&self) -> [f64; 2] {
-        let [before, step] = [&self.before, &self.step].map(|values| f64::from(typical(values)));
+        let [before, step] =
+            [&self.values.before, &self.values.step].map(|values| f64::from(typical(values)));
         [before, before + step]
     }
 
@@ -366,7 +315,7 @@ impl Tracer {
 
     /// Locates the edge whose shape was read; `blur` as there.
     #[inline(always)]
-    pub fn trace<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>, blur: (f64, f64)) {
+    pub fn trace<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>, blur: BlurEstimate) {
         let found = self.trace_open(table, scene);
         let is_open = found && self.unfit <= COVERED_SHARE && !self.lost_rows(scene);
         if is_open || self.trace_winding(table, scene) {
@@ -386,7 +335,7 @@ impl Tracer {
             self.read(scene);
         }
         self.blur_px = shape.step.blur;
-        self.common_variance = shape.variance;
+        self.uncertainty.common_variance = shape.variance;
         self.tabulate(table, &shape);
         for _ in 0..MAX_PASSES {
             self.hold(scene);
@@ -401,44 +350,50 @@ impl Tracer {
     /// Traces once more as if nothing covered the edge.
     #[cold]
     #[inline(never)]
-    fn trace_again<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>, blur: (f64, f64)) {
-        self.clear.clear();
-        let picked = std::mem::take(&mut self.picked);
+    fn trace_again<T: Grey>(
+        &mut self,
+        table: &StepTable,
+        scene: &Scene<'_, T>,
+        blur: BlurEstimate,
+    ) {
+        self.occlusion.clear.clear();
+        let picked = std::mem::take(&mut self.values.picked);
         let rough = picked.iter().map(|at| at.is_finite().then_some(*at));
         let seen = self.look(table, scene, rough);
-        self.picked = picked;
+        self.values.picked = picked;
         self.take_shape(table, blur);
         let found = seen.is_some() && self.trace_open(table, scene);
         self.state = if found { State::Hidden } else { State::Unseen };
     }
 
     fn look_for_texture<T: Grey>(&mut self, scene: &Scene<'_, T>, noise: f64) {
-        self.texture = None;
+        self.textured.texture = None;
         let Some(seen) = self.seen else { return };
         let Some(texture) = Texture::read(&self.overlay, noise * noise, seen.beside()) else {
             return;
         };
         let pitch = float(scene.strip.along) / self.overlay.laid().0;
         self.seen = Some(seen.in_texture(texture.over_area(pitch).sqrt()));
-        self.texture = Some(texture.in_grey(typical(&self.step).into()));
+        self.textured.texture = Some(texture.in_grey(typical(&self.values.step).into()));
     }
 
     /// Makes the template; one that knows the texture where there is some.
     fn tabulate(&mut self, table: &StepTable, shape: &Shape) {
-        self.scatter_in_texture = None;
-        if let Some(texture) = &self.texture {
-            self.template.tabulate(table, shape, true);
-            self.scatter_in_texture = self.template.whiten(&mut self.whitener, texture);
+        self.textured.scatter = None;
+        if let Some(texture) = &self.textured.texture {
+            self.row_fit.template.tabulate(table, shape, true);
+            self.textured.scatter =
+                self.row_fit.template.whiten(&mut self.textured.whitener, texture);
         }
-        if self.scatter_in_texture.is_none() {
-            self.texture = None;
-            self.template.tabulate(table, shape, false);
+        if self.textured.scatter.is_none() {
+            self.textured.texture = None;
+            self.row_fit.template.tabulate(table, shape, false);
         }
     }
 
     /// Variance of a pixel of the mean of so many rows \[grey levels²\].
     fn pixel_variance<T: Grey>(&self, scene: &Scene<'_, T>, rows: f32) -> f32 {
-        let texture = self.texture.map_or(0.0, |texture| narrow(texture.of_window()));
+        let texture = self.textured.texture.map_or(0.0, |texture| narrow(texture.of_window()));
         scene.noise * scene.noise / rows + texture
     }
 
@@ -455,11 +410,10 @@ impl Tracer {
         self.edges.clear();
         self.edges.resize(scene.lines.len(), None);
         let course = &self.course;
-        let rough =
-            scene.lines.iter().map(|&line| f64::from(course.at(narrow(pool::middle(line)))[0]));
+        let rough = scene.lines.iter().map(|&line| f64::from(course.at(narrow(line.middle()))[0]));
         let found = self.refiner.refine(table, &task, scene.bead_after, &mut self.edges, rough);
         self.blur_px = self.refiner.blur_px;
-        self.common_variance = 0.0;
+        self.uncertainty.common_variance = 0.0;
         self.misfit = f64::INFINITY;
         self.state = if found { State::Open } else { State::Unseen };
         found
@@ -469,7 +423,7 @@ impl Tracer {
     /// border and to the middle of the bead.
     fn room<T: Grey>(&self, scene: &Scene<'_, T>) -> Extent {
         let (low, high) =
-            self.path.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &at| {
+            self.values.path.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &at| {
                 (low.min(at), high.max(at))
             });
         #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
@@ -491,7 +445,7 @@ impl Tracer {
         let Step { at, before, after, .. } = shape.step;
         let height = after - before;
         let flanks = shape.flanks.about(at, height);
-        self.shift_course(at, (before, after));
+        self.shift_course(at, before, after);
         Shape {
             step: Step { at: 0.0, before: 0.0, after: 1.0, ..shape.step },
             shading: shape.shading.map(|shading| shading.of(height)),
@@ -503,40 +457,34 @@ impl Tracer {
 
     /// Moves what is expected aside and takes other levels: those before and after
     /// the edge as shares of the step.
-    fn shift_course(&mut self, aside: f64, (before, after): (f64, f64)) {
-        let levels = (narrow(before), narrow(after));
-        self.course.adopt(narrow(aside), levels);
-        self.sheet.adopt(narrow(aside), levels);
+    fn shift_course(&mut self, aside: f64, before: f64, after: f64) {
+        let [aside, before, after] = [aside, before, after].map(narrow);
+        self.course.adopt(Correction { aside, before, after });
+        self.sheet.adopt(Correction { aside, before, after });
     }
 
     /// Reads the pixels along the path.
     #[inline(always)]
     fn read<T: Grey>(&mut self, scene: &Scene<'_, T>) {
         let course = &self.course;
-        let most = if self.sort_rows { 1 } else { MOST_TOGETHER };
-        let how = (course.steepest(), most);
-        self.sheet.read(scene.strip, scene.lines, how, |v| course.at(v));
+        let most = if self.occlusion.sort_rows { 1 } else { MOST_TOGETHER };
+        let grouping = Grouping { steepest: course.steepest(), max_rows: most };
+        self.sheet.read(scene.strip, scene.lines, grouping, |v| course.at(v));
     }
 
     /// Draws the path anew through the edges that were found.
     #[inline(always)]
     fn redraw<T: Grey>(&mut self, scene: &Scene<'_, T>) {
         self.fill_from_edges(scene);
-        path::median_of_three(&mut self.rough);
-        if self.texture.is_some() && !self.winds {
+        path::median_of_three(&mut self.scratch.rough);
+        if self.textured.texture.is_some() && !self.winding.is_followed {
             // What the texture makes of a place is no path.
-            path::smooth(&self.rough, &mut self.sorted);
-            std::mem::swap(&mut self.rough, &mut self.sorted);
+            path::smooth(&self.scratch.rough, &mut self.scratch.sorted);
+            std::mem::swap(&mut self.scratch.rough, &mut self.scratch.sorted);
         }
-        self.course.redraw(scene.lines, &self.rough, &mut self.memory);
+        self.course.redraw(scene.lines, &self.scratch.rough, &mut self.scratch.course);
         self.read(scene);
     }
-}
-
-/// Mean of places across the bead \[px\].
-pub fn middle(places: &[Option<Located>]) -> f64 {
-    let sum: f64 = places.iter().flatten().map(|place| place.at).sum();
-    sum / float(places.iter().flatten().count().max(1))
 }
 
 fn typical(values: &[f32]) -> f32 {

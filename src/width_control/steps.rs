@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::core::units::{Mm, MmPerS};
+use crate::core::units::{Mm, MmPerS, WidthRange};
 
 /// The pieces: length over the reach, and how many shares the speed is changed by.
 /// Drawn once, with lengths of 0.7 to 2 and no piece like the one before, from those
@@ -43,7 +43,7 @@ pub struct StepSettings {
     /// Distance from the nozzle to the far end of the gauge.
     pub reach: Mm,
     /// Narrowest and widest width that is believed.
-    pub width_range: (Mm, Mm),
+    pub width_range: WidthRange,
 }
 
 impl StepSettings {
@@ -83,7 +83,7 @@ impl StepSettings {
 
     /// Whether a width is so near an end of the range that steps are not to go on.
     fn is_near_an_end(&self, width: Mm) -> bool {
-        let (min, max) = self.width_range;
+        let WidthRange { min, max } = self.width_range;
         let margin = (max - min) * MARGIN;
         width < min + margin || width > max - margin
     }
@@ -182,7 +182,7 @@ mod tests {
             start_speed: MmPerS::constant(100.0),
             share: 0.1,
             reach: Mm::constant(100.0),
-            width_range: (Mm::constant(20.0), Mm::constant(60.0)),
+            width_range: WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
         }
     }
 

@@ -10,6 +10,7 @@ use truebead::calibration::SurfaceMap;
 use truebead::core::frame::Frame;
 use truebead::core::geometry::Roi;
 use truebead::core::units::Mm;
+use truebead::core::units::WidthRange;
 use truebead::vision::{Axis, Gauge, Measurer, Polarity};
 
 use super::concrete_labels::{COLUMNS, Sequence};
@@ -46,8 +47,9 @@ impl Beads {
     }
 
     fn gauge(&self, roi: Roi) -> Gauge {
-        let range = [0.6, 1.3].map(|times| Mm::constant((times * self.sequence.width).round()));
-        Gauge::new(roi, Axis::Horizontal, Polarity::Bright, (range[0], range[1]))
+        let [min, max] =
+            [0.6, 1.3].map(|times| Mm::constant((times * self.sequence.width).round()));
+        Gauge::new(roi, Axis::Horizontal, Polarity::Bright, WidthRange { min, max })
     }
 
     /// Measures frames in shuffled order, each in its own region.

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use truebead::core::geometry::Roi;
 use truebead::core::units::Mm;
+use truebead::core::units::WidthRange;
 use truebead::vision::{Axis, Gauge, Polarity, WidthMeasurement};
 
 use super::statistics::{median, sizes};
@@ -77,7 +78,7 @@ fn gauge(listed: &Listed, pitch_px: f64) -> Gauge {
         width: 2 * half_width,
         height: 2 * half_height,
     };
-    let range = (Mm::constant(8.0), Mm::constant(45.0));
+    let range = WidthRange { min: Mm::constant(8.0), max: Mm::constant(45.0) };
     Gauge::new(roi, Axis::Horizontal, Polarity::Bright, range)
 }
 

@@ -6,6 +6,7 @@ use truebead::core::geometry::{Roi, Size};
 
 use truebead::core::frame::Frame;
 use truebead::core::units::Mm;
+use truebead::core::units::WidthRange;
 use truebead::io::image_file::has_image_extension;
 use truebead::vision::{Axis, Gauge, Polarity};
 
@@ -35,7 +36,7 @@ fn frames(name: &str) -> Option<Vec<Frame>> {
 
 fn gauge(frame: &Frame, axis: Axis, polarity: Polarity) -> Gauge {
     let Size { width, height } = frame.size();
-    let range = (Mm::constant(2.0), Mm::constant(600.0));
+    let range = WidthRange { min: Mm::constant(2.0), max: Mm::constant(600.0) };
     Gauge::new(Roi { x: 0, y: 0, width, height }, axis, polarity, range)
 }
 

@@ -3,6 +3,7 @@
 use crate::core::frame::Channel;
 use crate::core::geometry::Roi;
 use crate::core::units::Mm;
+use crate::core::units::WidthRange;
 use crate::document::Table;
 use crate::vision::gauge::{self, Axis, EdgeKind, Gauge, Method, Polarity};
 
@@ -44,7 +45,7 @@ pub(super) fn read_gauge(table: &Table<'_>) -> Option<Gauge> {
         roi: roi?,
         axis: axis?,
         polarity: polarity?,
-        width_range: (Mm::new(min).ok()?, Mm::new(max).ok()?),
+        width_range: WidthRange { min: Mm::new(min).ok()?, max: Mm::new(max).ok()? },
         method: method?,
         calipers: usize::try_from(calipers?).ok()?,
         min_contrast_grey: min_contrast_grey?,

@@ -73,12 +73,12 @@ pub fn tell(loaded: &LoadedCell, page: Option<&Path>) -> anyhow::Result<()> {
 /// narrowest and the widest.
 fn bead(loaded: &LoadedCell) -> Bead {
     let gauge = &loaded.cell.gauge;
-    let (narrowest, widest) = gauge.width_range;
+    let range = gauge.width_range;
     let across = match gauge.axis {
         Axis::Vertical => Vector2::x(),
         Axis::Horizontal => Vector2::y(),
     };
-    Bead { width_mm: (narrowest.get() * widest.get()).sqrt(), across }
+    Bead { width_mm: (range.min.get() * range.max.get()).sqrt(), across }
 }
 
 #[expect(clippy::cast_precision_loss, reason = "pixels of an image")]

@@ -3,6 +3,7 @@ use crate::core::frame::Pixels;
 use crate::core::geometry::Size;
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
+use crate::core::units::WidthRange;
 use crate::rows::frame_row::sample;
 use crate::vision::{Axis, Polarity};
 
@@ -13,7 +14,7 @@ fn gauge(roi: Roi) -> Gauge {
             roi,
             Axis::Vertical,
             Polarity::Bright,
-            (Mm::constant(1.0), Mm::constant(100.0)),
+            WidthRange { min: Mm::constant(1.0), max: Mm::constant(100.0) },
         )
     }
 }

@@ -10,6 +10,7 @@ use crate::control::step::Step;
 use crate::core::frame::Frame;
 use crate::core::geometry::ImagePoint;
 use crate::core::time::Stamp;
+use crate::core::units::WidthRange;
 use crate::core::units::{Mm, MmPerS};
 use crate::scenario::table::Level;
 use crate::sim::hash;
@@ -62,7 +63,7 @@ pub struct SimCamera {
     outliers: (f64, f64),
     missing_share: f64,
     /// Widths that are believed.
-    width_range: (Mm, Mm),
+    width_range: WidthRange,
     rides: bool,
     calibration: Calibration,
     surface_height: Mm,
@@ -169,7 +170,7 @@ impl SimCamera {
         }
         let seen = (truth + noise * self.noise.get()) * self.outlier(seq);
         let width = Mm::new(seen).map_err(|_| refused)?;
-        let (min, max) = self.width_range;
+        let WidthRange { min, max } = self.width_range;
         if !(min..=max).contains(&width) {
             let (got_mm, min_mm, max_mm) = (width.get(), min.get(), max.get());
             return Err(Reject::WidthOutOfRange { got_mm, min_mm, max_mm }.status());

@@ -3,6 +3,7 @@ use nalgebra::Vector3;
 use super::*;
 use crate::calibration::Camera;
 use crate::core::geometry::{Pose, Roi};
+use crate::core::units::WidthRange;
 use crate::vision::Polarity;
 
 mod disturbed;
@@ -10,7 +11,8 @@ mod disturbed;
 const PAPER_SCALE: f64 = 0.126_582;
 
 fn gauge(roi: Roi, axis: Axis) -> Gauge {
-    Gauge::new(roi, axis, Polarity::Bright, (Mm::constant(1.0), Mm::constant(90.0)))
+    let range = WidthRange { min: Mm::constant(1.0), max: Mm::constant(90.0) };
+    Gauge::new(roi, axis, Polarity::Bright, range)
 }
 
 fn upright() -> Gauge {

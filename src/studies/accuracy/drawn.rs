@@ -28,6 +28,7 @@ use crate::core::frame::{Frame, Pixels, WrongSize};
 use crate::core::geometry::{Roi, Size};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
+use crate::core::units::WidthRange;
 use crate::vision::{Axis, Gauge, Polarity};
 use draw::Draw;
 use scene::Scene;
@@ -73,8 +74,8 @@ impl DrawnSet {
 
 fn gauge(scene: &Scene, knows_gamma: bool) -> Gauge {
     let roi = Roi { x: 0, y: 0, width: scene.size.0, height: scene.size.1 };
-    let range = (Mm::constant(RANGE.0 * scene.width_px), Mm::constant(RANGE.1 * scene.width_px));
-    let gauge = Gauge::new(roi, Axis::Vertical, Polarity::Bright, range);
+    let [min, max] = [RANGE.0, RANGE.1].map(|times| Mm::constant(times * scene.width_px));
+    let gauge = Gauge::new(roi, Axis::Vertical, Polarity::Bright, WidthRange { min, max });
     if knows_gamma { Gauge { gamma: Some(scene.gamma), ..gauge } } else { gauge }
 }
 

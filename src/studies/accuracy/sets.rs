@@ -6,6 +6,7 @@ mod list;
 
 use crate::core::geometry::Roi;
 use crate::core::units::Mm;
+use crate::core::units::WidthRange;
 use crate::scenario::bead::Roughness;
 use crate::scenario::image::Picture;
 use crate::vision::{Axis, Gauge, Polarity};
@@ -115,7 +116,8 @@ impl Set {
             Axis::Horizontal => Roi { x: first, y: 40, width: rows, height: ACROSS.0 },
         };
         let range = if self.width_mm < 20.0 { [5.0, 25.0] } else { [20.0, 60.0] };
-        Gauge::new(roi, self.axis, self.polarity, (Mm::constant(range[0]), Mm::constant(range[1])))
+        let [min, max] = range.map(Mm::constant);
+        Gauge::new(roi, self.axis, self.polarity, WidthRange { min, max })
     }
 }
 

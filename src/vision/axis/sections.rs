@@ -3,8 +3,9 @@
 
 use nalgebra::Vector2;
 
-use super::{NODES, Scene};
+use super::width_input::Scene;
 use crate::core::geometry::SurfacePoint;
+use crate::numeric::gauss_legendre::NODES;
 use crate::vision::curve::Curve;
 
 /// Distance of the places from which an edge's direction and bend on the

@@ -1,11 +1,11 @@
 //! How sure a width is, and how rough the bead.
 
 use super::sections::Sections;
-use super::{Memory, Scene, Side};
+use super::width_input::{Memory, Scene, Side};
 use crate::numeric::number::float;
 use crate::vision::curve::Curve;
-use crate::vision::scatter;
-use crate::vision::trace::Located;
+use crate::vision::located::Located;
+use crate::vision::scatter::{self, Offset};
 use crate::vision::waviness::{CURVED, Evidence, Midline, ORDERS, Waves, legendre, norm};
 
 /// Share of the rows from which on nothing but the bead itself is seen.
@@ -147,7 +147,9 @@ impl Side<'_> {
     /// explains.
     fn inflation_with_gaps(&self, off: &[Option<f64>], curve: &Curve, per_place: f64) -> f64 {
         let places = off.iter().zip(self.places);
-        let places = places.filter_map(|(off, located)| Some(((*off)?, located.as_ref()?.share)));
+        let places = places.filter_map(|(off, located)| {
+            Some(Offset { px: (*off)?, share: located.as_ref()?.share })
+        });
         scatter::inflation_with_gaps(places, per_place, curve.count)
     }
 

@@ -2,10 +2,18 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{LAST_PX, LONGEST_PX, MAX_STEPS, MIN_HALF_PX, WINDOW};
+use super::descent::{LAST_PX, LONGEST_PX, MAX_STEPS};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::{float, narrow, whole};
 use crate::numeric::rank;
+
+/// Half of the window about an edge \[px\]: longer than a pattern of usual size, so that
+/// the ground's level is that beside the edge.
+pub(super) const HALF_PX: usize = 12;
+/// The same at least.
+pub(super) const MIN_HALF_PX: usize = 5;
+/// Pixels of the longest window.
+pub(super) const WINDOW: usize = 2 * HALF_PX + 1;
 
 /// Standard deviations of the ground's level within which that beside an edge is
 /// ground's.

@@ -1,6 +1,6 @@
 //! What a compression of the picture leaves open of a width.
 
-use super::Work;
+use super::work::Work;
 use crate::vision::trace::Tracer;
 
 /// Noise of a profile that moves its edges as a compression does that takes the pixels' noise

@@ -1,17 +1,18 @@
 //! The bead's two edges, from their contours to sub-pixel places: each in the
 //! way that suits it.
 
-use super::judge::is_strange;
+use super::checks::is_strange;
 use super::search::Found;
-use super::{NEED_SHARE, OFF_PX, Way, Work};
+use super::work::{NEED_SHARE, OFF_PX, Way, Work};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::narrow;
 use crate::numeric::rank;
-use crate::vision::covered;
+use crate::vision::blur_estimate::BlurEstimate;
 use crate::vision::light;
 use crate::vision::motion::BlurShapes;
-use crate::vision::noise::PixelNoise;
+use crate::vision::occluded;
 use crate::vision::overlay::Look;
+use crate::vision::pixel_noise::PixelNoise;
 use crate::vision::reject::Reject;
 use crate::vision::saturated;
 use crate::vision::strip::{Grey, Strip};
@@ -86,7 +87,7 @@ impl Work {
             }
             if self.left.is_hidden() || self.right.is_hidden() {
                 let candidates = &self.candidates;
-                let bead = covered::Bead { scenes, candidates, bright: pair.bright };
+                let bead = occluded::Bead { scenes, candidates, bright: pair.bright };
                 let tracers = [&mut self.left, &mut self.right];
                 bead.uncover(tracers, table, blur, &mut self.parallel);
                 let contours = [(&self.left, lefts.as_slice()), (&self.right, rights)];
@@ -112,13 +113,13 @@ impl Work {
 }
 
 /// Looks at both edges again with the blur's shape that fits best, where it is not a
-/// lens's alone; the blur of each and its standard deviation \[px\] with that shape.
+/// lens's alone; the blur of each with that shape.
 #[inline(always)]
 fn choose_blur<T: Grey>(
     shapes: &mut BlurShapes,
     [left, right]: [&mut Tracer; 2],
     scenes: &[Scene<'_, T>; 2],
-) -> Option<[Option<(f64, f64)>; 2]> {
+) -> Option<[Option<BlurEstimate>; 2]> {
     let again = |table: &StepTable, before: Option<[&Look; 2]>| {
         [(&left, 0), (&right, 1)]
             .map(|(edge, k)| edge.look_again(table, &scenes[k], before.map(|looks| looks[k])))
@@ -130,17 +131,16 @@ fn choose_blur<T: Grey>(
 }
 
 /// Blur that both edges have, seen through one lens, and how far one may differ
-/// from it \[px\], from that of each and its standard deviation; `None` where
-/// neither has one.
-fn common_blur(seen: [Option<(f64, f64)>; 2]) -> Option<(f64, f64)> {
-    let weight = |(blur, sd): (f64, f64)| 1.0 / (sd * sd + (DIFFERENT * blur).powi(2));
+/// from it, from that of each; `None` where neither has one.
+fn common_blur(seen: [Option<BlurEstimate>; 2]) -> Option<BlurEstimate> {
+    let weight = |BlurEstimate { px, sd_px }| 1.0 / (sd_px * sd_px + (DIFFERENT * px).powi(2));
     let (mut sum, mut weights) = (0.0, 0.0);
     for seen in seen.into_iter().flatten() {
-        sum += weight(seen) * seen.0;
+        sum += weight(seen) * seen.px;
         weights += weight(seen);
     }
     let blur = sum / weights;
-    (weights > 0.0).then_some((blur, DIFFERENT * blur))
+    (weights > 0.0).then_some(BlurEstimate { px: blur, sd_px: DIFFERENT * blur })
 }
 
 /// Width between edges of which one was uncovered elsewhere than where its contour runs, and

@@ -1,31 +1,24 @@
 //! Beads that have a texture, or lie on ground that has a pattern.
 
-use super::choice::has_grains;
-use super::judge::{WHOLE_SHARE, place};
-use super::rough::in_texture;
-use super::{NEED_SHARE, Work, even};
+use super::checks::{WHOLE_SHARE, place};
+use super::model_selection::has_grains;
+use super::pattern_limits::{
+    STRONGEST_BESIDE_WHOLE, STRONGEST_PATTERN, check_pattern, doubt_of_blur, in_texture,
+};
+use super::uniformity;
+use super::work::{NEED_SHARE, Work};
 use crate::calibration::SurfaceMap;
 use crate::numeric::number::float;
 use crate::vision::coarse::{LinePair, StepLine};
-use crate::vision::ground::{Place, Side};
+use crate::vision::gauge::WidthRangePx;
+use crate::vision::ground::{Place, Side, TOLD};
 use crate::vision::mean_edge::{BLURS_PX, Scene};
-use crate::vision::pool;
 use crate::vision::reject::Reject;
+use crate::vision::row_range::RowRange;
 use crate::vision::strip::{Grey, Strip, View};
 use crate::vision::trace::Tracer;
 use crate::vision::width::WidthMeasurement;
 
-/// Strongest pattern of the ground, as a fraction of the contrast: one of a third is
-/// measured, of a stronger one parts are taken for the bead.
-const STRONGEST: f64 = 0.37;
-/// The same where no mean profile tells the edges. Beside beads of real concrete, which
-/// have a texture themselves, other beads and grooves have up to 0.464; a pattern beside a
-/// plain bead is none of those.
-const STRONGEST_OF_SAME: f64 = 0.48;
-const STRONGEST_BESIDE_PLAIN: f64 = 0.2;
-/// The same where the blurred steps of a plain bead show all along it: beside drawn patterns
-/// of more, one in fifty was off by five standard deviations. A real strand has up to 0.2.
-pub(super) const STRONGEST_BESIDE_WHOLE: f64 = 0.25;
 /// Weakest pattern, as a fraction of the contrast, beside which blurred steps are not
 /// good enough: one of less draws them outwards by hardly 0.02 px.
 const NOTABLE: f64 = 0.06;
@@ -37,15 +30,6 @@ const ALIKE: f64 = 0.4;
 const HALF_WAY: f32 = 0.5;
 /// Blur beyond which a bead's texture is free of a flank that is not known yet \[px\].
 const LARGE_BLUR_PX: f64 = 3.0;
-/// Blur of a mean profile up to which its variance is what texture and pattern leave open
-/// \[px\]. Drawn beads with a blur of 1.5 px and texture on them had more in one of three frames,
-/// and the more, the more they were off: a z of 1.15, 1.3 and 1.4 where 2, 2.5 and 3 px fitted
-/// best, for places where the bead is dark pass for a flank.
-const SURE_BLUR_PX: f64 = 1.5;
-/// Variance of the ground along the bead in that of the noise from which on it has a
-/// pattern: less is not told from noise.
-const TOLD: f64 = 1.25;
-
 impl Work {
     /// Standard deviation of the pattern that the ground has on both sides of a pair of
     /// lines \[grey levels\]; 0 where one side has none: what is on one side alone is a
@@ -59,7 +43,11 @@ impl Work {
             least = least.min(edge.pattern(&scene, line).unwrap_or(0.0));
         }
         let variance = least * least;
-        if variance > TOLD * noise * noise { (variance - noise * noise).sqrt() } else { 0.0 }
+        if variance > (1.0 + TOLD) * noise * noise {
+            (variance - noise * noise).sqrt()
+        } else {
+            0.0
+        }
     }
 
     /// Measures a bead whose texture shows before any edge is located. `None` where none
@@ -68,7 +56,7 @@ impl Work {
     pub(super) fn measure_busy<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
-        range: (f32, f32),
+        range: WidthRangePx,
         view: &View,
         surface: &SurfaceMap,
     ) -> Option<Result<WidthMeasurement, Reject>> {
@@ -95,7 +83,7 @@ impl Work {
     pub(super) fn measure_textured<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
-        range: (f32, f32),
+        range: WidthRangePx,
         view: &View,
         surface: &SurfaceMap,
     ) -> Option<Result<WidthMeasurement, Reject>> {
@@ -180,7 +168,7 @@ impl Work {
         let middle = 0.5 * (float(strip.along) - 1.0);
         self.places.clear();
         self.places.extend(self.lines.iter().map(|&rows| {
-            let off = pool::middle(rows) - middle;
+            let off = rows.middle() - middle;
             Place { rows, at: f64::from(line.at) + off * f64::from(line.slope) }
         }));
         let side = Side {
@@ -229,8 +217,8 @@ impl Work {
         let one = left.locate(&scenes[0], self.blur_shapes.lens(), blur_px).ok_or(failed)?;
         let other = right.locate(&scenes[1], self.blur_shapes.lens(), blur_px).ok_or(failed)?;
         let got = pattern / one.contrast.min(other.contrast);
-        if got > STRONGEST {
-            return Err(Reject::Patterned { got, limit: STRONGEST });
+        if got > STRONGEST_PATTERN {
+            return Err(Reject::Patterned { got, limit: STRONGEST_PATTERN });
         }
         let ground = one.samples[0].with(other.samples[0]).variance();
         let bead = one.samples[1].with(other.samples[1]).variance();
@@ -238,12 +226,12 @@ impl Work {
             return Err(failed);
         }
         // An edge beside a strong pattern is drawn to its bright places.
-        let beside = ground * (1.0 + (got / STRONGEST).powi(4)) + bead;
+        let beside = ground * (1.0 + (got / STRONGEST_PATTERN).powi(4)) + bead;
         // A flank's slope falls with its blur, and what a texture moves an edge by grows with it.
         let doubt = doubt_of_blur(blur_px);
         let variance = beside * if pattern > 0.0 { doubt } else { doubt * doubt };
         let fits = [one, other].map(|fit| fit.as_rough(blur_px, variance));
-        even::check(&fits, even::middle_grey(strip, pair))?;
+        uniformity::check(&fits, uniformity::middle_grey(strip, pair))?;
         self.left_px.clear();
         self.right_px.clear();
         let [left, right] = &self.mean_edges;
@@ -266,30 +254,18 @@ fn are_alike([left, right]: [f64; 2]) -> bool {
     left.min(right) >= ALIKE * left.max(right)
 }
 
-/// Refuses a bead whose ground has a pattern, a fraction of the contrast, and whose mean
-/// profile tells no edges: parts of the pattern look like bead, and like grooves.
-pub(super) fn check_pattern(got: f64, is_textured: bool) -> Result<(), Reject> {
-    let limit = if is_textured { STRONGEST_OF_SAME } else { STRONGEST_BESIDE_PLAIN };
-    if got > limit { Err(Reject::Patterned { got, limit }) } else { Ok(()) }
-}
-
-/// By how much the variance of an edge of a textured bead grows with its blur.
-pub(super) fn doubt_of_blur(blur_px: f64) -> f64 {
-    (blur_px / SURE_BLUR_PX).max(1.0)
-}
-
 /// Where an edge lies on all caliper lines: where it is not located, between those beside it.
-fn place_all(tracer: &Tracer, lines: &[(usize, usize)], places: &mut Vec<Place>) {
+fn place_all(tracer: &Tracer, lines: &[RowRange], places: &mut Vec<Place>) {
     place(tracer, lines, places);
     if places.len() == lines.len() {
         return;
     }
     let located: Vec<(f64, f64)> =
-        places.iter().map(|place| (pool::middle(place.rows), place.at)).collect();
+        places.iter().map(|place| (place.rows.middle(), place.at)).collect();
     let (Some(first), Some(last)) = (located.first(), located.last()) else { return };
     places.clear();
     places.extend(lines.iter().map(|&rows| {
-        let row = pool::middle(rows);
+        let row = rows.middle();
         let after = located.partition_point(|place| place.0 < row);
         let (one, other) =
             (located[..after].last().unwrap_or(first), located[after..].first().unwrap_or(last));
@@ -301,7 +277,7 @@ fn place_all(tracer: &Tracer, lines: &[(usize, usize)], places: &mut Vec<Place>)
 /// What is looked at for one edge of a pair.
 fn scene<'a, T: Grey>(
     strip: &'a Strip<'a, T>,
-    lines: &'a [(usize, usize)],
+    lines: &'a [RowRange],
     pair: &LinePair,
     bead_after: bool,
 ) -> Scene<'a, T> {

@@ -1,12 +1,13 @@
 //! The search for the bead: candidates, contours, and the pair of them that is
 //! the bead's two edges.
 
-use super::{NEED_SHARE, Work};
+use super::work::{NEED_SHARE, Work};
 use crate::calibration::SurfaceMap;
+use crate::core::units::WidthRange;
 use crate::vision::contour::Contours;
 use crate::vision::edge::{Candidates, REACH, respond};
-use crate::vision::gauge::Polarity;
-use crate::vision::pair::{self, Pair, Search};
+use crate::vision::gauge::{Polarity, WidthRangePx};
+use crate::vision::pair::{self, Pair};
 use crate::vision::pool::Bands;
 use crate::vision::reject::Reject;
 use crate::vision::strip::View;
@@ -86,25 +87,25 @@ impl Work {
         &mut self,
         view: &View,
         surface: &SurfaceMap,
-    ) -> Result<(f32, f32), Reject> {
+    ) -> Result<WidthRangePx, Reject> {
         #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are small")]
         let (u, v) = (view.across as f64 / 2.0, view.along as f64 / 2.0);
         let middle = surface.to_mm(view.to_image(u, v)).ok_or(Reject::OffSurface)?;
         let beside = surface.to_mm(view.to_image(u + 1.0, v)).ok_or(Reject::OffSurface)?;
         let mm_per_px = (beside - middle).norm();
         self.mm_per_px = mm_per_px;
-        let (min, max) = self.gauge.width_range;
+        let WidthRange { min, max } = self.gauge.width_range;
         #[expect(clippy::cast_possible_truncation, reason = "widths in pixels")]
-        let range = (
-            (min.get() / mm_per_px / RANGE_SLACK) as f32,
-            (max.get() / mm_per_px * RANGE_SLACK) as f32,
-        );
+        let range = WidthRangePx {
+            min: (min.get() / mm_per_px / RANGE_SLACK) as f32,
+            max: (max.get() / mm_per_px * RANGE_SLACK) as f32,
+        };
         Ok(range)
     }
 
     /// The bead's two edges among the contours.
-    pub(super) fn find_pair(&mut self, width_px: (f32, f32)) -> Result<Found, Reject> {
-        let found = self.search(width_px);
+    pub(super) fn find_pair(&mut self, range: WidthRangePx) -> Result<Found, Reject> {
+        let found = self.search(range);
         if let Some(found) = found.filter(|found| found.pair.share >= NEED_SHARE) {
             return match found.pair.rival_px {
                 Some(rival_px) => Err(self.ambiguous(found.pair.width_px, rival_px)),
@@ -117,7 +118,8 @@ impl Work {
         let least = self.gauge.min_contrast_grey;
         let strong =
             |found: &Found| found.pair.share >= NEED_SHARE && f64::from(found.pair.step) >= least;
-        match self.search((4.0, f32::MAX)).filter(strong) {
+        let any = WidthRangePx { min: 4.0, max: f32::MAX };
+        match self.search(any).filter(strong) {
             Some(found) => Ok(found),
             None => Err(self.too_much_light().unwrap_or(refused)),
         }
@@ -129,8 +131,7 @@ impl Work {
         Reject::Ambiguous { first_mm: mm(first_px), second_mm: mm(second_px) }
     }
 
-    fn search(&mut self, width_px: (f32, f32)) -> Option<Found> {
-        let search = Search { width_px };
+    fn search(&mut self, range: WidthRangePx) -> Option<Found> {
         let mut best: Option<Found> = None;
         for bright in [true, false] {
             let unwanted = if bright { Polarity::Dark } else { Polarity::Bright };
@@ -139,7 +140,7 @@ impl Work {
             }
             let (lefts, rights) =
                 if bright { (&self.ups, &self.downs) } else { (&self.downs, &self.ups) };
-            let pair = pair::find(lefts, rights, search, &mut self.memory);
+            let pair = pair::find(lefts, rights, range, &mut self.memory);
             best = match (best, pair) {
                 (Some(best), Some(pair)) if best.pair.score >= pair.score => Some(best),
                 (best, None) => best,
@@ -156,5 +157,5 @@ impl Work {
 }
 
 fn strip_rows(bands: &Bands) -> usize {
-    bands.count().checked_sub(1).map_or(0, |last| bands.rows(last).1)
+    bands.count().checked_sub(1).map_or(0, |last| bands.rows(last).end)
 }

@@ -4,6 +4,7 @@ use crate::core::frame::Pixels;
 use crate::core::geometry::{Pose, Roi, Size};
 use crate::core::time::Stamp;
 use crate::core::units::Mm;
+use crate::core::units::WidthRange;
 use crate::vision::gauge::{Axis, EdgeKind, Polarity};
 use nalgebra::Vector3;
 use rand::SeedableRng;
@@ -45,7 +46,7 @@ fn gauge(from: usize, to: usize) -> Gauge {
         Roi { x: from, y: 0, width: to - from, height: 60 },
         Axis::Vertical,
         Polarity::Bright,
-        (Mm::constant(10.0), Mm::constant(400.0)),
+        WidthRange { min: Mm::constant(10.0), max: Mm::constant(400.0) },
     )
 }
 

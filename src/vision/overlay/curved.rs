@@ -3,7 +3,8 @@
 //! beside a bead.
 
 use super::Overlay;
-use super::shape::{Beside, Flanks, Shading, Step};
+use super::shape::{Beside, Shading};
+use super::step::FlankedStep;
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::normal_equations::Normal;
 
@@ -29,17 +30,18 @@ impl Overlay {
     pub(super) fn curved(
         &self,
         table: &StepTable,
-        (step, flanks): (&Step, &Flanks),
+        edge: FlankedStep<'_>,
         noise: f64,
-        (sign, room): (f64, f64),
+        sign: f64,
+        room: f64,
     ) -> Option<Beside> {
-        let height = step.after - step.before;
-        let first = 3.0 * step.blur;
+        let height = edge.step.after - edge.step.before;
+        let first = 3.0 * edge.step.blur;
         let mut normal = Normal::<3>::default();
         let (mut end, mut rows) = (first, 0.0);
         while end + 2.0 <= room.min(FARTHEST_PX) {
             let (mut place, mut miss, mut weight) = (0.0, 0.0, 0.0);
-            self.beside_step(table, (step, flanks), (sign, end), |away, off, rows| {
+            self.beside_step(table, edge, sign, end, |away, off, rows| {
                 place += rows * away;
                 miss += rows * off;
                 weight += rows;
@@ -60,7 +62,7 @@ impl Overlay {
                     break;
                 }
             }
-            self.beside_step(table, (step, flanks), (sign, end), |away, off, rows| {
+            self.beside_step(table, edge, sign, end, |away, off, rows| {
                 normal.add(terms(away), off, rows);
             });
             rows += weight;

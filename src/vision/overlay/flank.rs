@@ -4,17 +4,17 @@
 use nalgebra::SVector;
 
 use super::Overlay;
-use super::shape::{Extent, LEAST_BLUR_PX, Look, MAX_STEPS, SHADING_SD, Step, place_limit};
+use super::look::{Look, MAX_STEPS, SHADING_SD, place_limit};
+use super::step::{Extent, Flank, Flanks, LEAST_BLUR_PX, Step};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::normal_equations::Normal;
+use crate::vision::blur_estimate::BlurEstimate;
 
 /// Unknowns: place, blur, levels and shading of the edge, then place, height and
 /// blur of what lies before it and after it.
 const UNKNOWNS: usize = 12;
 /// Number of the first unknown of a flank on either side.
 const FLANKS: [usize; 2] = [6, 9];
-/// Farthest that a flank is fitted, in blurs: from there on its tail is nothing.
-const NEAR_BLURS: f64 = 7.0;
 /// Samples beyond a flank that tell its course, in blurs.
 const BEYOND_BLURS: f64 = 2.0;
 /// Share of the edge's blur by which a flank's usually differs.
@@ -27,64 +27,6 @@ const WORSE: f64 = 0.01;
 /// Weight that holds an unknown.
 const FIXED: f64 = 1e12;
 
-/// A step beside the edge.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Flank {
-    /// Its place, beside the path \[px\].
-    pub at: f64,
-    /// What it adds to the level beyond it, in shares of the edge's step.
-    pub height: f64,
-    /// Its blur \[px\].
-    pub blur: f64,
-}
-
-impl Flank {
-    /// What it adds to the level at a place, and the derivatives of that by
-    /// place, height and blur. `sign` is −1 for one before the edge, 1 for one
-    /// after it.
-    #[inline(always)]
-    fn reaches(&self, table: &StepTable, at: f64, sign: f64) -> (f64, [f64; 3]) {
-        let z = sign * (at - self.at) / self.blur;
-        let (share, density) = table.at(z);
-        let per_px = self.height * density / self.blur;
-        (self.height * share, [-sign * per_px, share, -z * per_px])
-    }
-}
-
-/// The steps beside an edge: before it and after it.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Flanks(pub [Option<Flank>; 2]);
-
-impl Flanks {
-    /// Whether there are any.
-    pub fn any(&self) -> bool {
-        self.0.iter().any(Option::is_some)
-    }
-
-    /// What they add to the level at a place beside the path, in shares of the
-    /// step.
-    pub fn at(&self, table: &StepTable, at: f64) -> f64 {
-        let one = |(flank, sign): (&Option<Flank>, f64)| {
-            flank.as_ref().map_or(0.0, |flank| flank.reaches(table, at, sign).0)
-        };
-        self.0.iter().zip([-1.0, 1.0]).map(one).sum()
-    }
-
-    /// The same flanks about an edge that lies at a place beside the path and
-    /// has another step, of which the given one is a share.
-    pub fn about(&self, at: f64, share: f64) -> Self {
-        let moved =
-            |flank: Flank| Flank { at: flank.at - at, height: flank.height / share, ..flank };
-        Self(self.0.map(|flank| flank.map(moved)))
-    }
-
-    /// Only those near enough to an edge to reach into its pixels.
-    pub fn near(&self, step: &Step) -> Self {
-        let near = |flank: &Flank| (flank.at - step.at).abs() < NEAR_BLURS * step.blur;
-        Self(self.0.map(|flank| flank.filter(near)))
-    }
-}
-
 impl Overlay {
     /// Fits an edge and the steps beside it. `start` has rough ones, and the
     /// edge as it was fitted without them. `None` where that is no better.
@@ -94,7 +36,7 @@ impl Overlay {
         &self,
         table: &StepTable,
         start: &Look,
-        known: Option<(f64, f64)>,
+        known: Option<BlurEstimate>,
     ) -> Option<Look> {
         let mut look = *start;
         for _ in 0..MAX_STEPS {
@@ -159,12 +101,12 @@ fn reach(look: &Look) -> Extent {
 }
 
 /// Holds what is known, and unknowns that there are not.
-fn hold(normal: &mut Normal<UNKNOWNS>, look: &Look, known: Option<(f64, f64)>) {
+fn hold(normal: &mut Normal<UNKNOWNS>, look: &Look, known: Option<BlurEstimate>) {
     let weight = |sd: f64| (look.noise / sd).powi(2);
     normal.hold(4, weight(SHADING_SD), -look.shading[0]);
     normal.hold(5, weight(SHADING_SD), -look.shading[1]);
-    if let Some((mean, sd)) = known {
-        normal.hold(1, weight(sd), mean - look.step.blur);
+    if let Some(BlurEstimate { px, sd_px }) = known {
+        normal.hold(1, weight(sd_px), px - look.step.blur);
     }
     for (flank, first) in look.flanks.0.iter().zip(FLANKS) {
         match flank {

@@ -3,7 +3,7 @@
 
 use nalgebra::SVector;
 
-use super::shape::Look;
+use super::look::Look;
 use super::{Overlay, PHASES};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::normal_equations::Normal;

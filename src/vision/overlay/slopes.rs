@@ -1,12 +1,20 @@
 //! How steeply the overlay runs, place by place: where the edge is steepest,
 //! and whether another step lies beside it.
 
-use super::flank::Flank;
-use super::shape::{Extent, Step};
+use super::step::{Extent, Flank, Step};
 use super::{Overlay, PHASES, REACH, SPAN};
 
 /// Distance from the path within which the edge lies \[px\].
 const NEAR_PX: f64 = 8.0;
+
+/// What shows a step beside the edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlopeLimits {
+    /// Standard deviation of a slope by noise \[1/px\].
+    pub noise: f64,
+    /// Slope that shows such a step, times the edge's blur.
+    pub notable: f64,
+}
 
 /// Mean slopes over two pixels \[1/px\], each phase's share of the mean of both.
 pub struct Slopes([[f32; SPAN]; PHASES]);
@@ -55,17 +63,17 @@ impl Slopes {
         (best.0 > 0.01).then_some((f64::from(best.0), f64::from(best.1) / 2.0))
     }
 
-    /// Room on one side up to half-way to a neighbouring step, and that step. `noise` is
-    /// that of a slope, `notable` the slope that shows such a step, times the edge's blur.
+    /// Room on one side up to half-way to a neighbouring step, and that step.
     #[expect(clippy::cast_possible_truncation, reason = "a slope needs no more")]
     #[inline(always)]
     pub fn up_to_neighbour(
         &self,
         start: Step,
-        (noise, notable): (f64, f64),
-        (sign, room): (i16, f64),
+        limits: SlopeLimits,
+        sign: i16,
+        room: f64,
     ) -> (f64, Option<Flank>) {
-        let notable = (5.0 * noise).max(notable / start.blur.max(1.0)) as f32;
+        let notable = (5.0 * limits.noise).max(limits.notable / start.blur.max(1.0)) as f32;
         let first = (0.5 * start.blur).clamp(0.5, 3.0);
         let mut lowest = (f32::INFINITY, room);
         let from = halves(start.at + f64::from(sign) * first);
@@ -76,7 +84,7 @@ impl Slopes {
                 lowest = (slope, first + f64::from(step) / 2.0);
             }
             if slope > lowest.0 + notable {
-                return (lowest.1, self.flank(start.blur, (from, sign, step..last)));
+                return (lowest.1, self.flank(start.blur, from, sign, step..last));
             }
         }
         (room, None)
@@ -84,11 +92,7 @@ impl Slopes {
 
     /// The step whose slope rises from a place on, in half pixels.
     #[cold]
-    fn flank(
-        &self,
-        blur: f64,
-        (from, sign, steps): (i16, i16, std::ops::Range<i16>),
-    ) -> Option<Flank> {
+    fn flank(&self, blur: f64, from: i16, sign: i16, steps: std::ops::Range<i16>) -> Option<Flank> {
         let mut best = (0.0f32, 0, 0.0f32);
         for step in steps {
             let half = from + sign * step;

@@ -3,12 +3,16 @@ use crate::core::frame::{Frame, Pixels};
 use crate::core::geometry::{Roi, Size};
 use crate::core::time::Stamp;
 use crate::numeric::blurred_step::StepTable;
+use crate::vision::blur_estimate::BlurEstimate;
+use crate::vision::edge_windows::Grouping;
 use crate::vision::gauge::Axis;
+use crate::vision::row_range::RowRange;
 use crate::vision::strip::{Strips, Turner, View};
 
 const ROWS: usize = 100;
 const COLUMNS: usize = 160;
-const LINES: [(usize, usize); 4] = [(0, 25), (25, 50), (50, 75), (75, 100)];
+const LINES: [RowRange; 4] =
+    [RowRange::new(0, 25), RowRange::new(25, 50), RowRange::new(50, 75), RowRange::new(75, 100)];
 const BLUR_PX: f64 = 1.6;
 /// Standard deviation of a pixel of 8 bits in shares of a step of 80 levels.
 const NOISE: f64 = 0.05;
@@ -33,7 +37,7 @@ fn overlay(beside: impl Fn(f64) -> f64) -> Overlay {
     let mut turner = Turner::default();
     let Strips::Words(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
     let mut sheet = Sheet::default();
-    sheet.read(&strip, &LINES, (0.0, 1), |_| EXPECTED);
+    sheet.read(&strip, &LINES, Grouping { steepest: 0.0, max_rows: 1 }, |_| EXPECTED);
     let mut overlay = Overlay::default();
     overlay.lay(&sheet);
     overlay
@@ -44,7 +48,9 @@ fn shape(overlay: &Overlay) -> Shape {
     let table = StepTable::default();
     let room = Extent { before: 45.0, after: 45.0 };
     let look = overlay.look(&table, NOISE, room).unwrap();
-    overlay.shape(&table, &look, (look.step.blur, 0.04 * BLUR_PX)).unwrap()
+    overlay
+        .shape(&table, &look, BlurEstimate { px: look.step.blur, sd_px: 0.04 * BLUR_PX })
+        .unwrap()
 }
 
 #[test]

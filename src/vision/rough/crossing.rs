@@ -3,7 +3,7 @@
 use super::window::Row;
 use crate::numeric::number::single;
 use crate::numeric::number::whole;
-use crate::vision::sheet::SPAN;
+use crate::vision::edge_windows::SPAN;
 
 /// How far inside the edge's course a row is summed \[px\]: beyond a usual flank.
 pub const INSIDE_PX: f32 = 5.0;

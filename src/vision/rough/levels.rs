@@ -1,15 +1,15 @@
 //! Grey levels on either side of an edge, along its course, and where each row
 //! passes from one to the other.
 
-use super::Scene;
 use super::crossing::{self, Crossing, Flank};
 use super::kernel;
+use super::rough_input::Scene;
 use super::window::{BLOCK_ROWS, STRAIGHT_ROWS, Windows};
 use crate::numeric::number::whole;
 use crate::numeric::number::{float, single};
 use crate::numeric::rank;
+use crate::vision::edge_windows::SPAN;
 use crate::vision::gauge::EdgeKind;
-use crate::vision::sheet::SPAN;
 
 /// Pixels outside that are searched for what the bead stands against: a groove's
 /// darkest place or the ground.
@@ -198,7 +198,8 @@ impl Levels {
         scene: &Scene<'_, T>,
     ) -> Option<()> {
         if self.kernels[0].is_empty() {
-            self.kernels = [INSIDE_ROWS, OUTSIDE_ROWS].map(|rows| kernel(rows / float(BLOCK_ROWS)));
+            self.kernels =
+                [INSIDE_ROWS, OUTSIDE_ROWS].map(|rows| kernel::gaussian(rows / float(BLOCK_ROWS)));
         }
         self.block = windows.block();
         self.align(windows, course);

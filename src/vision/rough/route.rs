@@ -5,7 +5,7 @@ use super::window::{Row, Windows};
 use crate::numeric::number::single;
 use crate::numeric::number::whole;
 use crate::numeric::rank;
-use crate::vision::sheet::SPAN;
+use crate::vision::edge_windows::SPAN;
 
 /// Pixels on either side that are compared for a step, as a fraction of the
 /// bead's width: wide against texture, narrow against the bead.

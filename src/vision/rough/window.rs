@@ -1,10 +1,12 @@
 //! Rows about an edge, turned so that the bead lies at higher positions and is
 //! the brighter side, and smoothed.
 
-use super::{Scene, kernel};
+use super::kernel;
+use super::rough_input::Scene;
 use crate::numeric::number::{float, narrow};
 use crate::vision::coarse::StepLine;
-use crate::vision::sheet::{SPAN, Sheet};
+use crate::vision::edge_windows::{Grouping, SPAN, Sheet};
+use crate::vision::row_range::RowRange;
 use crate::vision::strip::Grey;
 
 /// Pixels of a row.
@@ -104,16 +106,18 @@ impl Windows {
         let together = if strip.along > MANY_ROWS { 2 } else { 1 };
         if self.together != together {
             self.together = together;
-            self.kernels = [kernel(ACROSS_PX), kernel(ALONG_PX / float(together))];
+            self.kernels =
+                [kernel::gaussian(ACROSS_PX), kernel::gaussian(ALONG_PX / float(together))];
         }
         let at = |v: f32| [line.at + line.slope * (v - middle), 0.0, 1.0];
         // Caliper lines of an odd number of rows would leave single ones over.
-        self.sheet.read(strip, &[(0, strip.along)], (0.3, self.together), at);
+        let grouping = Grouping { steepest: 0.3, max_rows: self.together };
+        self.sheet.read(strip, &[RowRange::new(0, strip.along)], grouping, at);
         self.lines.clear();
         let mut line = 0;
         for window in self.sheet.windows() {
             let is_beyond = |end: usize| narrow(float(end)) <= window.middle + 0.5;
-            while scene.lines.get(line).is_some_and(|line| is_beyond(line.1)) {
+            while scene.lines.get(line).is_some_and(|line| is_beyond(line.end)) {
                 line += 1;
             }
             self.lines.push(line);

@@ -3,11 +3,11 @@
 
 use nalgebra::Matrix3;
 
-use super::bands::BandSums;
+use super::band_sums::BandSums;
+use super::group::Group;
 use super::{MANY_SIGMA, Scene, Tracer};
 use crate::numeric::number::{float, narrow};
 use crate::numeric::rank;
-use crate::vision::pool;
 use crate::vision::strip::Grey;
 use crate::vision::template::{Expected, PlainSums, RowSums};
 
@@ -21,38 +21,20 @@ const FEW_WILD: f32 = 2.0;
 /// is covered for certain.
 const UNFIT: f32 = 1.5;
 
-/// A few rows that are held against the edge together.
-#[derive(Debug, Clone, Copy)]
-pub struct Group {
-    /// The band that they belong to.
-    pub band: usize,
-    /// Number of rows.
-    pub weight: f32,
-    /// How far the rows were sampled beyond the path \[px\].
-    pub ahead: f32,
-    /// What they say.
-    pub sums: RowSums,
-    /// Place of the edge beside the path \[px\].
-    pub moved: f32,
-    /// Sum of the squares of what does not fit, as if of a single row
-    /// \[grey levels²\].
-    pub misfit: f32,
-}
-
 impl Tracer {
     /// Holds every window against the edge.
     #[inline(always)]
     pub(super) fn hold<T: Grey>(&mut self, scene: &Scene<'_, T>) {
-        let softness = 1.0 / narrow(self.template.products.slope_slope);
-        self.groups.clear();
-        self.plain.clear();
-        self.plain.resize(scene.lines.len(), PlainSums::default());
+        let softness = 1.0 / narrow(self.row_fit.template.products.slope_slope);
+        self.row_fit.groups.clear();
+        self.row_fit.plain.clear();
+        self.row_fit.plain.resize(scene.lines.len(), PlainSums::default());
         // Noise of a pixel in the mean of so many rows.
         let (mut rows, mut noise) = (0.0, 0.0);
         for (number, window) in self.sheet.windows().iter().enumerate() {
             let (band, weight) = (window.line, window.rows);
-            if self.clear.get(number) == Some(&false) {
-                self.groups.push(Group::hidden(band, weight));
+            if self.occlusion.clear.get(number) == Some(&false) {
+                self.row_fit.groups.push(Group::hidden(band, weight));
                 continue;
             }
             let [path, _, step] = window.expected;
@@ -61,12 +43,12 @@ impl Tracer {
             }
             let expected = Self::expected(window.expected, noise);
             let pixels = (self.sheet.pixels(number).as_slice(), window.first);
-            let sums = self.template.hold(pixels, &expected, &mut self.plain[band]);
+            let sums = self.row_fit.template.hold(pixels, &expected, &mut self.row_fit.plain[band]);
             let sums = sums.unwrap_or(RowSums::OUT_OF_SIGHT);
             let ahead = expected.at - path;
             let moved = ahead - sums.slope * softness / step;
             let misfit = self.misfit(&sums, weight);
-            self.groups.push(Group { band, weight, ahead, sums, moved, misfit });
+            self.row_fit.groups.push(Group { band, weight, ahead, sums, moved, misfit });
         }
     }
 
@@ -85,10 +67,10 @@ impl Tracer {
             return f32::INFINITY;
         }
         // Weights that know a texture are not the slope of the step.
-        if self.texture.is_some() {
+        if self.textured.texture.is_some() {
             return weight * sums.squares;
         }
-        let stiffness = narrow(self.template.products.slope_slope);
+        let stiffness = narrow(self.row_fit.template.products.slope_slope);
         weight * (sums.squares - sums.slope * sums.slope / stiffness)
     }
 
@@ -96,39 +78,40 @@ impl Tracer {
     /// spark lies.
     #[inline(always)]
     pub(super) fn gather<T: Grey>(&mut self, scene: &Scene<'_, T>) {
-        let products = self.template.products;
-        self.sorted.clear();
-        self.sorted.extend(self.groups.iter().map(|group| group.misfit));
-        if !self.clear.is_empty() {
+        let products = self.row_fit.template.products;
+        self.scratch.sorted.clear();
+        self.scratch.sorted.extend(self.row_fit.groups.iter().map(|group| group.misfit));
+        if !self.occlusion.clear.is_empty() {
             // What is hidden says nothing.
-            self.sorted.retain(|misfit| misfit.is_finite());
+            self.scratch.sorted.retain(|misfit| misfit.is_finite());
         }
-        let median = rank::median(&mut self.sorted).unwrap_or(f32::INFINITY);
+        let median = rank::median(&mut self.scratch.sorted).unwrap_or(f32::INFINITY);
         let pixels = narrow(products.pixels);
-        let together = self.groups.iter().fold(1.0, |most: f32, group| most.max(group.weight));
+        let together =
+            self.row_fit.groups.iter().fold(1.0, |most: f32, group| most.max(group.weight));
         let variance = together * self.pixel_variance(scene, together);
-        let alike = self.texture.map_or(1.0, |texture| narrow(texture.pixels_alike()));
+        let alike = self.textured.texture.map_or(1.0, |texture| narrow(texture.pixels_alike()));
         let limit = variance * (pixels + MANY_SIGMA * (2.0 * pixels * alike).sqrt());
         let limit = limit.max(UNLIKE * median);
         self.misfit = f64::from(median / (variance * pixels)).sqrt();
         // The variance of a window in texture has the texture's share of it already.
-        self.together = if self.texture.is_some() { 1.0 } else { together.into() };
+        self.together = if self.textured.texture.is_some() { 1.0 } else { together.into() };
         let covered =
             |group: &&Group| group.misfit > UNFIT * limit || group.misfit == f32::INFINITY;
-        let unfit = self.groups.iter().filter(covered).count();
-        self.unfit = float(unfit) / float(self.groups.len().max(1));
-        if self.clear.is_empty() {
+        let unfit = self.row_fit.groups.iter().filter(covered).count();
+        self.unfit = float(unfit) / float(self.row_fit.groups.len().max(1));
+        if self.occlusion.clear.is_empty() {
             self.spread_misfits(limit);
         }
-        self.solved.clear();
+        self.row_fit.solved.clear();
         let mut first = 0;
         for band in 0..scene.lines.len() {
             let mut end = first;
-            while end < self.groups.len() && self.groups[end].band == band {
+            while end < self.row_fit.groups.len() && self.row_fit.groups[end].band == band {
                 end += 1;
             }
             let sums = self.gather_band(scene, (band, first..end), limit, &products.matrix());
-            self.solved.push(sums);
+            self.row_fit.solved.push(sums);
             first = end;
         }
     }
@@ -136,12 +119,12 @@ impl Tracer {
     /// Rows next to one that fits badly share its grain or spark.
     fn spread_misfits(&mut self, limit: f32) {
         let mut before = 0.0;
-        for k in 0..self.groups.len() {
-            let here = self.groups[k].misfit;
-            let after = self.groups.get(k + 1).map_or(0.0, |group| group.misfit);
+        for k in 0..self.row_fit.groups.len() {
+            let here = self.row_fit.groups[k].misfit;
+            let after = self.row_fit.groups.get(k + 1).map_or(0.0, |group| group.misfit);
             let beside = f32::max(before, after);
             if beside > limit {
-                self.groups[k].misfit = here.max(beside);
+                self.row_fit.groups[k].misfit = here.max(beside);
             }
             before = here;
         }
@@ -156,28 +139,28 @@ impl Tracer {
         core: &Matrix3<f64>,
     ) -> BandSums {
         let stiffness = narrow(core[(0, 0)]);
-        let [_, _, step] = self.course.at(narrow(pool::middle(scene.lines[band])));
-        let groups = &self.groups[groups];
-        self.sorted.clear();
+        let [_, _, step] = self.course.at(narrow(scene.lines[band].middle()));
+        let groups = &self.row_fit.groups[groups];
+        self.scratch.sorted.clear();
         let fitting = groups.iter().filter(|group| group.misfit <= limit);
-        self.sorted.extend(fitting.map(|group| group.moved));
-        let typical = median_of_few(&mut self.sorted);
-        let in_texture = self.scatter_in_texture.map(|scatter| narrow(scatter.of_window));
+        self.scratch.sorted.extend(fitting.map(|group| group.moved));
+        let typical = median_of_few(&mut self.scratch.sorted);
+        let in_texture = self.textured.scatter.map(|scatter| narrow(scatter.of_window));
         let of_window = |weight: f32| {
             in_texture.unwrap_or(scene.noise * scene.noise / (weight * stiffness)).sqrt()
         };
         let widen = |(count, sum): (f32, f32)| (f64::from(count), f64::from(sum));
         let mut sums = BandSums {
             step: step.into(),
-            before: widen(self.plain[band].before()),
-            after: widen(self.plain[band].after()),
+            before: widen(self.row_fit.plain[band].before()),
+            after: widen(self.row_fit.plain[band].after()),
             ..BandSums::default()
         };
         for group in groups {
             let far = MANY_SIGMA * of_window(group.weight) / step.abs() + WAVY_PX;
             let counts = group.misfit <= limit && (group.moved - typical).abs() <= far;
             sums.all_rows += f64::from(group.weight);
-            if self.clear.is_empty() || group.misfit < f32::INFINITY {
+            if self.occlusion.clear.is_empty() || group.misfit < f32::INFINITY {
                 sums.held_rows += f64::from(group.weight);
             }
             if counts {
@@ -189,14 +172,6 @@ impl Tracer {
         sums.before = (sums.before.0 * weight, sums.before.1 * weight);
         sums.after = (sums.after.0 * weight, sums.after.1 * weight);
         sums
-    }
-}
-
-impl Group {
-    /// Rows that are not to be held.
-    fn hidden(band: usize, weight: f32) -> Self {
-        let (ahead, moved, misfit) = (0.0, 0.0, f32::INFINITY);
-        Self { band, weight, ahead, sums: RowSums::default(), moved, misfit }
     }
 }
 

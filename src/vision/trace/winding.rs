@@ -6,9 +6,8 @@ use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::narrow;
 use crate::numeric::number::single;
 use crate::numeric::rank;
+use crate::vision::edge_windows::{Grouping, MIDDLE, PLENTY, SPAN, Window};
 use crate::vision::path;
-use crate::vision::pool;
-use crate::vision::sheet::{MIDDLE, PLENTY, SPAN, Window};
 use crate::vision::strip::Grey;
 
 /// How far a band lies off the line between its neighbours from which on an edge winds
@@ -35,7 +34,7 @@ impl Tracer {
     /// than bands.
     #[inline(always)]
     pub(super) fn follow_windings<T: Grey>(&mut self, scene: &Scene<'_, T>) {
-        self.winding = if could_wind(scene) { self.winding(scene.noise) } else { 0.0 };
+        self.winding.excess = if could_wind(scene) { self.winding(scene.noise) } else { 0.0 };
         if self.seems_winding() {
             self.pick_lines(scene);
         }
@@ -48,18 +47,19 @@ impl Tracer {
 
     /// Whether the edge winds more quickly than bands show it, as far as they tell.
     pub fn seems_winding(&self) -> bool {
-        self.winding > 1.0
+        self.winding.excess > 1.0
     }
 
     /// How far most bands lie off the line between their neighbours, 1 where that is
     /// more than picks scatter.
     fn winding(&mut self, noise: f32) -> f32 {
-        let least = WINDING_PX.max(WINDING_IN_NOISE_PX * noise / typical(&self.step).abs());
-        self.sorted.clear();
-        let offs = self.picked.windows(3).map(|near| (near[1] - 0.5 * (near[0] + near[2])).abs());
-        self.sorted.extend(offs.filter(|off| !off.is_nan()));
-        let quarter = self.sorted.len() / 4;
-        rank::at(&mut self.sorted, quarter).unwrap_or(0.0) / least
+        let least = WINDING_PX.max(WINDING_IN_NOISE_PX * noise / typical(&self.values.step).abs());
+        self.scratch.sorted.clear();
+        let offs =
+            self.values.picked.windows(3).map(|near| (near[1] - 0.5 * (near[0] + near[2])).abs());
+        self.scratch.sorted.extend(offs.filter(|off| !off.is_nan()));
+        let quarter = self.scratch.sorted.len() / 4;
+        rank::at(&mut self.scratch.sorted, quarter).unwrap_or(0.0) / least
     }
 
     /// Locates the edge along places picked from line to line. Returns whether all but a
@@ -94,12 +94,12 @@ impl Tracer {
     /// Fills the rough places with the edges that were found; where none was, a
     /// winding edge stays on its course, and another one runs straight on.
     pub(super) fn fill_from_edges<T: Grey>(&mut self, scene: &Scene<'_, T>) {
-        let (course, winds) = (&self.course, self.winds);
+        let (course, winds) = (&self.course, self.winding.is_followed);
         let places = self.edges.iter().zip(scene.lines).map(|(edge, &line)| match edge {
             Some(edge) => Some(narrow(edge.at)),
-            None => winds.then(|| course.at(narrow(pool::middle(line)))[0]),
+            None => winds.then(|| course.at(narrow(line.middle()))[0]),
         });
-        path::fill(places, &mut self.rough);
+        path::fill(places, &mut self.scratch.rough);
     }
 
     /// Draws the course through the places where each line has its highest step.
@@ -107,26 +107,31 @@ impl Tracer {
     #[cold]
     #[inline(never)]
     fn pick_lines<T: Grey>(&mut self, scene: &Scene<'_, T>) -> bool {
-        let picked = self.picked.iter().map(|at| at.is_finite().then_some(*at));
-        if !path::fill(picked, &mut self.path) {
+        let picked = self.values.picked.iter().map(|at| at.is_finite().then_some(*at));
+        if !path::fill(picked, &mut self.values.path) {
             return false;
         }
-        path::take_out_wild(&mut self.path, &mut self.sorted);
-        let rest = self.path.iter().map(|at| at.is_finite().then_some(*at));
-        path::fill(rest, &mut self.rough);
-        std::mem::swap(&mut self.path, &mut self.rough);
-        self.course.draw(scene.bands, &self.path, &self.before, &self.step);
+        path::take_out_wild(&mut self.values.path, &mut self.scratch.sorted);
+        let rest = self.values.path.iter().map(|at| at.is_finite().then_some(*at));
+        path::fill(rest, &mut self.scratch.rough);
+        std::mem::swap(&mut self.values.path, &mut self.scratch.rough);
+        self.course.draw(scene.bands, &self.values.path, &self.values.before, &self.values.step);
         let course = &self.course;
         let tall = scene.strip.along.div_ceil(scene.lines.len());
-        self.sheet.read(scene.strip, scene.lines, (0.0, tall), |v| course.at(v));
+        self.sheet.read(
+            scene.strip,
+            scene.lines,
+            Grouping { steepest: 0.0, max_rows: tall },
+            |v| course.at(v),
+        );
         let windows = self.sheet.windows().iter().enumerate();
         let picks = windows.map(|(number, window)| pick(window, self.sheet.pixels(number)));
-        if !path::fill(picks, &mut self.rough) {
+        if !path::fill(picks, &mut self.scratch.rough) {
             return false;
         }
-        path::median_of_three(&mut self.rough);
-        self.course.redraw(scene.lines, &self.rough, &mut self.memory);
-        self.winds = true;
+        path::median_of_three(&mut self.scratch.rough);
+        self.course.redraw(scene.lines, &self.scratch.rough, &mut self.scratch.course);
+        self.winding.is_followed = true;
         true
     }
 }

@@ -6,7 +6,7 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use crate::core::time::Span;
-use crate::core::units::{Mm, MmPerS};
+use crate::core::units::{Mm, MmPerS, WidthRange};
 use crate::document::Table;
 use crate::width_control::controller::WidthController;
 use crate::width_control::limiter::Limits;
@@ -52,7 +52,7 @@ pub struct CellFacts {
     /// Width that is wanted most of the time.
     pub target: Mm,
     /// Narrowest and widest width that is accepted.
-    pub width_range: (Mm, Mm),
+    pub width_range: WidthRange,
     /// Gains of PI control, where the cell gives them.
     pub gains: Option<PiGains>,
     /// Longest time between two widths over which is integrated.

@@ -4,6 +4,7 @@ use crate::cell::Source;
 use crate::core::frame::Frame;
 use crate::core::geometry::Roi;
 use crate::core::robot::RobotMode;
+use crate::core::units::WidthRange;
 use crate::core::units::{Mm, MmPerS};
 use crate::scenario::bead::{BeadModel, Roughness};
 use crate::scenario::disturbance::Flow;
@@ -50,7 +51,7 @@ fn camera() -> (RenderedCamera, RobotView, Sender<()>) {
             Roi { x: 10, y: 10, width: 140, height: 100 },
             Axis::Vertical,
             Polarity::Bright,
-            (Mm::constant(1.0), Mm::constant(15.0)),
+            WidthRange { min: Mm::constant(1.0), max: Mm::constant(15.0) },
         )
     };
     let described = Camera {

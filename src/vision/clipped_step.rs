@@ -4,9 +4,10 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use super::blur_estimate::BlurEstimate;
 use super::censor::{self, Seen};
+use super::edge_windows::{Sheet, Window};
 use super::overlay::{Overlay, Profile};
-use super::sheet::{Sheet, Window};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::normal_equations::Normal;
 use crate::numeric::rank;
@@ -104,8 +105,8 @@ pub struct CutOff {
     profiles: Vec<Profile>,
     rows: Vec<Row>,
     sorted: Vec<f64>,
-    /// Blur of the frames before and its standard deviation \[px\].
-    blur: Option<(f64, f64)>,
+    /// Blur of the frames before.
+    blur: Option<BlurEstimate>,
 }
 
 /// What a row tells.
@@ -185,14 +186,14 @@ impl Scene {
 
 impl CutOff {
     /// Fits the step to the rows of an overlay along a path. `blur` is what is
-    /// known of the blur: mean and standard deviation \[px\]. `None` where no
-    /// step can be fitted.
+    /// known of the blur. `None` where no step can be fitted.
     pub fn fit(
         &mut self,
         table: &StepTable,
         scene: &Scene,
         overlay: &Overlay,
-        (start, blur): (Step, Option<(f64, f64)>),
+        start: Step,
+        blur: Option<BlurEstimate>,
     ) -> Option<Found> {
         overlay.profiles(PARTS, &mut self.profiles);
         let mean_visible = self.mean_visible(scene.hidden_after);
@@ -205,8 +206,8 @@ impl CutOff {
             let (mut normal, misfit) = self.linearise(table, scene, window, &step, mean_visible);
             let seen = (scene.white - step.visible).max(scene.noise);
             normal.hold(3, (FAR_ABOVE * seen).powi(-2), scene.white - step.hidden);
-            if let Some((mean, sd)) = blur {
-                normal.hold(1, sd.powi(-2), mean - step.blur);
+            if let Some(BlurEstimate { px, sd_px }) = blur {
+                normal.hold(1, sd_px.powi(-2), px - step.blur);
             }
             let solved = normal.solve()?;
             let moved = solved.unknowns;
@@ -228,16 +229,16 @@ impl CutOff {
 
     /// The blur that is expected where a frame alone says so much: that of the
     /// frames before, as far as the lens is still the same.
-    pub fn expected_blur(&self, alone: &Found) -> Option<(f64, f64)> {
-        let (blur, sd) = self.blur?;
-        let (sd, off) = (sd.hypot(DRIFT * blur), (blur - alone.step.blur).abs());
+    pub fn expected_blur(&self, alone: &Found) -> Option<BlurEstimate> {
+        let BlurEstimate { px, sd_px } = self.blur?;
+        let (sd, off) = (sd_px.hypot(DRIFT * px), (px - alone.step.blur).abs());
         let changed = off > ANOTHER * sd.hypot(alone.blur_sd);
-        Some((blur, if changed { off } else { sd }))
+        Some(BlurEstimate { px, sd_px: if changed { off } else { sd } })
     }
 
     /// Keeps a blur for the frames to come.
     pub fn remember(&mut self, found: &Found) {
-        self.blur = Some((found.step.blur, found.blur_sd));
+        self.blur = Some(BlurEstimate { px: found.step.blur, sd_px: found.blur_sd });
     }
 
     fn mean_visible(&self, hidden_after: bool) -> f64 {
@@ -281,7 +282,8 @@ impl CutOff {
         &mut self,
         table: &StepTable,
         scene: &Scene,
-        (sheet, lines): (&Sheet, usize),
+        sheet: &Sheet,
+        lines: usize,
         found: &Found,
         mut take: impl FnMut(usize, Option<Line>),
     ) -> f64 {
@@ -411,11 +413,15 @@ mod tests {
     use crate::core::frame::{Frame, Pixels};
     use crate::core::geometry::{Roi, Size};
     use crate::core::time::Stamp;
+    use crate::vision::edge_windows::Grouping;
     use crate::vision::gauge::Axis;
+    use crate::vision::path::Correction;
+    use crate::vision::row_range::RowRange;
     use crate::vision::strip::{Strips, Turner, View};
 
     const SIZE: (usize, usize) = (120, 40);
-    const LINES: [(usize, usize); 4] = [(0, 10), (10, 20), (20, 30), (30, 40)];
+    const LINES: [RowRange; 4] =
+        [RowRange::new(0, 10), RowRange::new(10, 20), RowRange::new(20, 30), RowRange::new(30, 40)];
 
     /// A path that lies off the edge, with the levels that a glance gives.
     struct Straight {
@@ -453,7 +459,8 @@ mod tests {
         let mut turner = Turner::default();
         let Strips::Words(strip) = turner.strips(&frame, &view, None) else { unreachable!() };
         let mut sheet = Sheet::default();
-        sheet.read(&strip, &LINES, (0.0, 1), |_| path.expected());
+        let grouping = Grouping { steepest: 0.0, max_rows: 1 };
+        sheet.read(&strip, &LINES, grouping, |_| path.expected());
         sheet
     }
 
@@ -470,7 +477,7 @@ mod tests {
             overlay.lay(&sheet);
             let start = Step { at: 0.0, blur: 1.2, visible: 175.0, hidden: 280.0 };
             let mut cut_off = CutOff::default();
-            let found = cut_off.fit(&table, &scene, &overlay, (start, None)).unwrap();
+            let found = cut_off.fit(&table, &scene, &overlay, start, None).unwrap();
             assert!((found.step.at - 0.5).abs() < 0.005, "{found:?}");
             assert!((found.step.blur - 1.6).abs() < 0.005, "{found:?}");
             assert!((found.step.hidden - 300.0).abs() < 0.5, "{found:?}");
@@ -478,9 +485,9 @@ mod tests {
             // The scatter that 40 rows allow where nothing is known before.
             assert!((0.10..0.25).contains(&found.variance.sqrt()), "{found:?}");
             let mut lines = Vec::new();
-            sheet.adopt(60.25 - path.at, (0.0, 1.0));
-            let rows = (&sheet, LINES.len());
-            cut_off.locate(&table, &scene, rows, &found, |_, line| lines.push(line.unwrap()));
+            sheet.adopt(Correction { aside: 60.25 - path.at, before: 0.0, after: 1.0 });
+            let take = |_, line: Option<Line>| lines.push(line.unwrap());
+            cut_off.locate(&table, &scene, &sheet, LINES.len(), &found, take);
             assert_eq!(lines.len(), 4);
             assert!(lines.iter().all(|line| (line.moved - 0.05).abs() < 0.006), "{lines:?}");
         }
@@ -498,10 +505,10 @@ mod tests {
         let mut cut_off = CutOff::default();
         assert_eq!(cut_off.expected_blur(&found(1.5, 0.05)), None);
         cut_off.remember(&found(1.5, 0.01));
-        let (blur, sd) = cut_off.expected_blur(&found(1.55, 0.05)).unwrap();
-        assert_eq!(blur, 1.5);
-        assert!((sd - 0.01_f64.hypot(0.003)).abs() < 1e-12);
-        let (_, sd) = cut_off.expected_blur(&found(2.5, 0.05)).unwrap();
-        assert!((sd - 1.0).abs() < 1e-12);
+        let expected = cut_off.expected_blur(&found(1.55, 0.05)).unwrap();
+        assert_eq!(expected.px, 1.5);
+        assert!((expected.sd_px - 0.01_f64.hypot(0.003)).abs() < 1e-12);
+        let expected = cut_off.expected_blur(&found(2.5, 0.05)).unwrap();
+        assert!((expected.sd_px - 1.0).abs() < 1e-12);
     }
 }

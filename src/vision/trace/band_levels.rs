@@ -21,24 +21,24 @@ impl Tracer {
     /// Picks levels anew along the course, where it was drawn through better places
     /// and it is known how far there is nothing but the edge \[px\].
     pub(super) fn pick_levels_within<T: Grey>(&mut self, scene: &Scene<'_, T>, room: Extent) {
-        let Self { path, course, .. } = self;
+        let (path, course) = (&mut self.values.path, &self.course);
         path.clear();
         let middles = (0..scene.bands.count()).map(|band| narrow(scene.bands.middle(band)));
         path.extend(middles.map(|middle| course.at(middle)[0]));
         self.pick_levels_in(scene, [narrow(room.before), narrow(room.after)]);
         self.smooth_levels();
-        self.levels.draw(scene.bands, &self.path, &self.before, &self.step);
+        self.levels.draw(scene.bands, &self.values.path, &self.values.before, &self.values.step);
         self.course.take_levels(&self.levels);
     }
 
     /// Smooths the picked levels from band to band.
     fn smooth_levels(&mut self) {
-        path::median_of_three(&mut self.before);
-        path::median_of_three(&mut self.step);
-        path::smooth(&self.before, &mut self.rough);
-        std::mem::swap(&mut self.before, &mut self.rough);
-        path::smooth(&self.step, &mut self.rough);
-        std::mem::swap(&mut self.step, &mut self.rough);
+        path::median_of_three(&mut self.values.before);
+        path::median_of_three(&mut self.values.step);
+        path::smooth(&self.values.before, &mut self.scratch.rough);
+        std::mem::swap(&mut self.values.before, &mut self.scratch.rough);
+        path::smooth(&self.values.step, &mut self.scratch.rough);
+        std::mem::swap(&mut self.values.step, &mut self.scratch.rough);
         self.steady_steps();
     }
 
@@ -52,27 +52,27 @@ impl Tracer {
     /// The same no farther from the edge than there is room before it and after it
     /// \[px\].
     fn pick_levels_in<T: Grey>(&mut self, scene: &Scene<'_, T>, room: [f32; 2]) {
-        self.before.clear();
-        self.step.clear();
+        self.values.before.clear();
+        self.values.step.clear();
         let (left, right) = (picked(-1.0, room[0]), picked(1.0, room[1]));
         let unit = scene.bands.unit();
-        for (band, &at) in self.path.iter().enumerate() {
+        for (band, &at) in self.values.path.iter().enumerate() {
             let profile = scene.bands.profile(band);
             #[expect(clippy::cast_possible_truncation, reason = "a place in the gauge")]
             let at = (at + 0.5) as isize;
             let before = unit * level(profile, at, left);
-            self.before.push(before);
-            self.step.push(unit * level(profile, at, right) - before);
+            self.values.before.push(before);
+            self.values.step.push(unit * level(profile, at, right) - before);
         }
     }
 
     /// Steps that are small or turned over against the others are not believed.
     pub(super) fn steady_steps(&mut self) {
-        self.sorted.clear();
-        self.sorted.extend_from_slice(&self.step);
-        let Some(typical) = rank::median(&mut self.sorted) else { return };
+        self.scratch.sorted.clear();
+        self.scratch.sorted.extend_from_slice(&self.values.step);
+        let Some(typical) = rank::median(&mut self.scratch.sorted) else { return };
         let typical = if typical.abs() < 1.0 { 1.0f32.copysign(typical) } else { typical };
-        for step in &mut self.step {
+        for step in &mut self.values.step {
             if *step / typical < 0.3 {
                 *step = 0.3 * typical;
             }

@@ -1,6 +1,7 @@
 //! A bead of whose edges so much is covered that one alone does not tell which
 //! of its rows are clear.
 
+use super::blur_estimate::BlurEstimate;
 use super::edge::{Candidate, Candidates};
 use super::parallel::Parallel;
 use super::strip::Grey;
@@ -33,7 +34,7 @@ impl<T: Grey> Bead<'_, T> {
         &self,
         [left, right]: [&mut Tracer; 2],
         table: &StepTable,
-        blur: (f64, f64),
+        blur: BlurEstimate,
         parallel: &mut Parallel,
     ) {
         let [left_scene, right_scene] = &self.scenes;
@@ -42,14 +43,14 @@ impl<T: Grey> Bead<'_, T> {
         let bands = self.candidates.len();
         let lefts = |band| self.places(band, left, left_scene, self.bright);
         let rights = |band| self.places(band, right, right_scene, !self.bright);
-        if !parallel.find(bands, (lefts, rights), range) {
+        if !parallel.find(bands, lefts, rights, range) {
             return;
         }
         if left.is_hidden() {
-            left.uncover_along(table, left_scene, (blur, parallel.lefts()));
+            left.uncover_along(table, left_scene, blur, parallel.lefts());
         }
         if right.is_hidden() {
-            right.uncover_along(table, right_scene, (blur, parallel.rights()));
+            right.uncover_along(table, right_scene, blur, parallel.rights());
         }
     }
 

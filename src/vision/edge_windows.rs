@@ -1,6 +1,8 @@
 //! The gauge straightened along an edge: the pixels around it, one window a few
 //! rows, read once and held against the edge as often as it takes.
 
+use super::path::Correction;
+use super::row_range::RowRange;
 use super::strip::{Grey, Strip};
 use crate::numeric::number::{floor, single};
 
@@ -30,6 +32,15 @@ pub struct Window {
     pub expected: [f32; 3],
 }
 
+/// How rows are taken together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grouping {
+    /// Steepest slope of the edge \[px across per px along\].
+    pub steepest: f32,
+    /// Most rows of a window.
+    pub max_rows: usize,
+}
+
 /// Windows along an edge; keeps its memory from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct Sheet {
@@ -49,9 +60,8 @@ impl Sheet {
         &self.pixels[window]
     }
 
-    /// Expects the edge a little aside, and other levels: those before and after
-    /// it as shares of the step.
-    pub fn adopt(&mut self, aside: f32, (before, after): (f32, f32)) {
+    /// Expects the edge a little aside, and other levels.
+    pub fn adopt(&mut self, Correction { aside, before, after }: Correction) {
         for window in &mut self.windows {
             let [at, level, step] = window.expected;
             window.expected = [at + aside, level + before * step, (after - before) * step];
@@ -59,23 +69,23 @@ impl Sheet {
     }
 
     /// Reads the windows about an edge of which `expected` is told for a place
-    /// along it, and which nowhere runs aside more than `steepest`.
-    /// Rows are taken together within caliper lines: one where there are few,
-    /// more, but no more than `most`, where a tall gauge has plenty.
+    /// along it. Rows are taken together within caliper lines: one where there are
+    /// few, more where a tall gauge has plenty.
     #[inline(always)]
     pub fn read<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
-        lines: &[(usize, usize)],
-        (steepest, most): (f32, usize),
+        lines: &[RowRange],
+        grouping: Grouping,
         expected: impl Fn(f32) -> [f32; 3],
     ) {
-        let together = rows_together(strip.along, lines.len(), steepest).min(most);
+        let together = rows_together(strip.along, lines.len(), grouping.steepest);
+        let together = together.min(grouping.max_rows);
         self.windows.clear();
-        for (line, &(from, to)) in lines.iter().enumerate() {
-            let mut v = from;
-            while v < to {
-                let rows = together.min(to - v);
+        for (line, bounds) in lines.iter().enumerate() {
+            let mut v = bounds.first;
+            while v < bounds.end {
+                let rows = together.min(bounds.end - v);
                 let middle = single(2 * v + rows - 1) / 2.0;
                 let expected = expected(middle);
                 let first = floor(expected[0].into()) - MIDDLE.cast_signed();

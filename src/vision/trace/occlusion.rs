@@ -6,10 +6,10 @@ use crate::numeric::blurred_step::StepTable;
 use crate::numeric::number::narrow;
 use crate::numeric::number::single;
 use crate::numeric::rank;
-use crate::vision::agree::agree;
+use crate::vision::blur_estimate::BlurEstimate;
+use crate::vision::consensus::agree;
 use crate::vision::overlay::{Extent, Shape};
 use crate::vision::path;
-use crate::vision::pool;
 use crate::vision::strip::Grey;
 use crate::vision::template::{PlainSums, Template};
 use crate::vision::trace::Scene;
@@ -62,8 +62,8 @@ impl Tracer {
     #[inline(never)]
     pub(super) fn uncover<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
         self.look_row_by_row();
-        self.free.clear();
-        self.free.extend_from_slice(&self.picked);
+        self.occlusion.free.clear();
+        self.occlusion.free.extend_from_slice(&self.values.picked);
         let mut best = (NONE_CLEAR, 0);
         for attempt in 0..ATTEMPTS {
             let clear = self.try_course(table, scene).unwrap_or(NONE_CLEAR);
@@ -73,9 +73,9 @@ impl Tracer {
             }
             if clear > best.0 {
                 best = (clear, attempt);
-                std::mem::swap(&mut self.free, &mut self.best_free);
-                self.free.clear();
-                self.free.extend_from_slice(&self.best_free);
+                std::mem::swap(&mut self.occlusion.free, &mut self.occlusion.best_free);
+                self.occlusion.free.clear();
+                self.occlusion.free.extend_from_slice(&self.occlusion.best_free);
             }
             if attempt + 1 < ATTEMPTS {
                 self.set_course_aside();
@@ -85,7 +85,7 @@ impl Tracer {
             return false;
         }
         if best.0 < SURE {
-            std::mem::swap(&mut self.free, &mut self.best_free);
+            std::mem::swap(&mut self.occlusion.free, &mut self.occlusion.best_free);
             if self.try_course(table, scene).is_none() {
                 return false;
             }
@@ -96,10 +96,10 @@ impl Tracer {
     /// Rows are judged one by one, each against noise alone: what covers some of
     /// them would pass for texture.
     fn look_row_by_row(&mut self) {
-        self.sort_rows = true;
-        self.winds = false;
-        self.texture = None;
-        self.scatter_in_texture = None;
+        self.occlusion.sort_rows = true;
+        self.winding.is_followed = false;
+        self.textured.texture = None;
+        self.textured.scatter = None;
     }
 
     /// Locates an edge from its clear rows where the bead's other edge shows how this one runs: where most
@@ -112,11 +112,12 @@ impl Tracer {
         &mut self,
         table: &StepTable,
         scene: &Scene<'_, T>,
-        (blur, places): ((f64, f64), &[f32]),
+        blur: BlurEstimate,
+        places: &[f32],
     ) {
         self.look_row_by_row();
-        self.free.clear();
-        self.free.extend_from_slice(places);
+        self.occlusion.free.clear();
+        self.occlusion.free.extend_from_slice(places);
         if self.try_course(table, scene).is_some() && self.finish(table, scene) {
             self.state = State::Covered;
         } else {
@@ -129,18 +130,20 @@ impl Tracer {
     /// is the least distance that makes a stray. Where there are many, they stay,
     /// and tell that the edge is unsure.
     pub fn drop_strays(&mut self, least_px: f64) {
-        self.rough.clear();
+        self.scratch.rough.clear();
         let places = self.edges.iter();
-        self.rough.extend(places.map(|edge| edge.map_or(f32::NAN, |edge| narrow(edge.at))));
-        self.sorted.clear();
-        self.sorted.extend(self.edges.iter().flatten().map(|edge| narrow(edge.variance.sqrt())));
-        let count = self.sorted.len();
-        let Some(sigma) = rank::median(&mut self.sorted) else { return };
-        let left = agree(&mut self.rough, narrow(least_px).max(MANY_SIGMA * sigma));
+        self.scratch.rough.extend(places.map(|edge| edge.map_or(f32::NAN, |edge| narrow(edge.at))));
+        self.scratch.sorted.clear();
+        self.scratch
+            .sorted
+            .extend(self.edges.iter().flatten().map(|edge| narrow(edge.variance.sqrt())));
+        let count = self.scratch.sorted.len();
+        let Some(sigma) = rank::median(&mut self.scratch.sorted) else { return };
+        let left = agree(&mut self.scratch.rough, narrow(least_px).max(MANY_SIGMA * sigma));
         if single(count - left) > MOST_STRAYS * single(count) {
             return;
         }
-        for (edge, at) in self.edges.iter_mut().zip(&self.rough) {
+        for (edge, at) in self.edges.iter_mut().zip(&self.scratch.rough) {
             if at.is_nan() {
                 *edge = None;
             }
@@ -151,9 +154,9 @@ impl Tracer {
     #[inline(never)]
     fn finish<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> bool {
         let Some(shape) = self.read_shape(table, scene) else { return false };
-        self.template.tabulate(table, &shape, false);
+        self.row_fit.template.tabulate(table, &shape, false);
         self.blur_px = shape.step.blur;
-        self.common_variance = shape.variance;
+        self.uncertainty.common_variance = shape.variance;
         self.hold(scene);
         self.gather(scene);
         self.locate(scene, shape.step.blur);
@@ -164,25 +167,25 @@ impl Tracer {
     /// on, and their share. `None` where there are too few.
     #[inline(never)]
     fn try_course<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> Option<f32> {
-        self.clear.clear();
+        self.occlusion.clear.clear();
         if !self.take_course(scene) {
             return None;
         }
         self.read(scene);
-        let (windows, trusted) = (self.sheet.windows(), &self.trusted);
+        let (windows, trusted) = (self.sheet.windows(), &self.occlusion.trusted);
         let clear = |number: usize| trusted[scene.bands.band_of(windows[number].middle)];
         self.overlay.settle(&self.sheet, clear);
         for _ in 0..PASSES {
             let shape = self.read_shape(table, scene)?;
-            self.template.tabulate(table, &shape, false);
-            self.clear.clear();
+            self.row_fit.template.tabulate(table, &shape, false);
+            self.occlusion.clear.clear();
             self.hold(scene);
             if !self.judge_rows(scene, shape.step.blur) {
                 return None;
             }
             self.follow(scene);
             self.read(scene);
-            let clear = &self.clear;
+            let clear = &self.occlusion.clear;
             self.overlay.lay_clear(&self.sheet, |number| clear[number]);
         }
         Some(self.clear_share())
@@ -190,7 +193,7 @@ impl Tracer {
 
     /// Takes the bands that agreed out of those that are free to.
     fn set_course_aside(&mut self) {
-        for (free, trusted) in self.free.iter_mut().zip(&self.trusted) {
+        for (free, trusted) in self.occlusion.free.iter_mut().zip(&self.occlusion.trusted) {
             if *trusted {
                 *free = f32::NAN;
             }
@@ -199,56 +202,60 @@ impl Tracer {
 
     /// The course that most bands agree on, in place and levels.
     fn take_course<T: Grey>(&mut self, scene: &Scene<'_, T>) -> bool {
-        self.rough.clear();
-        self.rough.extend_from_slice(&self.free);
-        if agree(&mut self.rough, OFF_PX) < 4 {
+        self.scratch.rough.clear();
+        self.scratch.rough.extend_from_slice(&self.occlusion.free);
+        if agree(&mut self.scratch.rough, OFF_PX) < 4 {
             return false;
         }
-        self.trusted.clear();
-        self.trusted.extend(self.rough.iter().map(|at| at.is_finite()));
+        self.occlusion.trusted.clear();
+        self.occlusion.trusted.extend(self.scratch.rough.iter().map(|at| at.is_finite()));
         self.fill_rough();
-        std::mem::swap(&mut self.rough, &mut self.path);
+        std::mem::swap(&mut self.scratch.rough, &mut self.values.path);
         self.pick_raw_levels(scene);
-        let step = typical(&self.step).abs();
+        let step = typical(&self.values.step).abs();
         let off = OFF_LEVEL * step + OFF_LEVEL_SIGMA * scene.noise;
         // The level after the edge stands in for the step until it is smooth.
-        for (step, before) in self.step.iter_mut().zip(&self.before) {
+        for (step, before) in self.values.step.iter_mut().zip(&self.values.before) {
             *step += before;
         }
-        std::mem::swap(&mut self.before, &mut self.rough);
-        agree(&mut self.rough, off);
+        std::mem::swap(&mut self.values.before, &mut self.scratch.rough);
+        agree(&mut self.scratch.rough, off);
         self.fill_rough();
-        std::mem::swap(&mut self.before, &mut self.rough);
-        std::mem::swap(&mut self.step, &mut self.rough);
-        agree(&mut self.rough, off);
+        std::mem::swap(&mut self.values.before, &mut self.scratch.rough);
+        std::mem::swap(&mut self.values.step, &mut self.scratch.rough);
+        agree(&mut self.scratch.rough, off);
         self.fill_rough();
-        std::mem::swap(&mut self.step, &mut self.rough);
-        for (step, before) in self.step.iter_mut().zip(&self.before) {
+        std::mem::swap(&mut self.values.step, &mut self.scratch.rough);
+        for (step, before) in self.values.step.iter_mut().zip(&self.values.before) {
             *step -= before;
         }
         self.steady_steps();
-        self.course.draw(scene.bands, &self.path, &self.before, &self.step);
+        self.course.draw(scene.bands, &self.values.path, &self.values.before, &self.values.step);
         true
     }
 
     /// Fills the gaps of rough values and smooths them.
     fn fill_rough(&mut self) {
-        let values = self.rough.iter().map(|value| value.is_finite().then_some(*value));
-        path::fill(values, &mut self.sorted);
-        path::smooth(&self.sorted, &mut self.rough);
+        let values = self.scratch.rough.iter().map(|value| value.is_finite().then_some(*value));
+        path::fill(values, &mut self.scratch.sorted);
+        path::smooth(&self.scratch.sorted, &mut self.scratch.rough);
     }
 
     /// Reads the edge's shape from the overlay and takes it over. Rows are
     /// known to be clear about the edge only: beside it spots may lie anywhere,
     /// and would pass for shading.
     fn read_shape<T: Grey>(&mut self, table: &StepTable, scene: &Scene<'_, T>) -> Option<Shape> {
-        let noise = f64::from(scene.noise) / f64::from(typical(&self.step).abs());
+        let noise = f64::from(scene.noise) / f64::from(typical(&self.values.step).abs());
         let room = self.room(scene);
         let look = self.overlay.look(table, noise, room)?;
         let core = Template::core_half(look.step.blur);
         let room = Extent { before: room.before.min(core), after: room.after.min(core) };
         let look = self.overlay.look(table, noise, room)?;
-        let shape = self.overlay.shape(table, &look, (look.step.blur, f64::INFINITY))?;
+        let shape = self.overlay.shape(
+            table,
+            &look,
+            BlurEstimate { px: look.step.blur, sd_px: f64::INFINITY },
+        )?;
         let other = f64::max(shape.step.before.abs(), (shape.step.after - 1.0).abs());
         if other > OTHER_LEVELS {
             return None;
@@ -261,7 +268,7 @@ impl Tracer {
     fn judge_rows<T: Grey>(&mut self, scene: &Scene<'_, T>, blur: f64) -> bool {
         let limit = self.limit_of_rows(scene.noise);
         let far = self.far_of_rows(scene, limit);
-        let weight = self.groups.first().map_or(1.0, |group| group.weight);
+        let weight = self.row_fit.groups.first().map_or(1.0, |group| group.weight);
         let rows = single(scene.strip.along);
         for blurs in BESIDE_BLURS {
             #[expect(
@@ -270,11 +277,11 @@ impl Tracer {
                 reason = "a few rows"
             )]
             let reach = (blurs * blur / f64::from(weight)).ceil() as usize;
-            self.clear.clear();
-            for (k, group) in self.groups.iter().enumerate() {
-                let near = k.saturating_sub(reach)..(k + reach + 1).min(self.groups.len());
-                let hit = self.groups[near].iter().any(|group| group.misfit > limit);
-                self.clear.push(!hit && group.moved.abs() <= far);
+            self.occlusion.clear.clear();
+            for (k, group) in self.row_fit.groups.iter().enumerate() {
+                let near = k.saturating_sub(reach)..(k + reach + 1).min(self.row_fit.groups.len());
+                let hit = self.row_fit.groups[near].iter().any(|group| group.misfit > limit);
+                self.occlusion.clear.push(!hit && group.moved.abs() <= far);
             }
             let clear = self.clear_share() * rows;
             if clear >= f32::max(WANTED.0 * rows, WANTED.1) {
@@ -288,31 +295,31 @@ impl Tracer {
 
     /// Squares that a clear row leaves at most.
     fn limit_of_rows(&mut self, noise: f32) -> f32 {
-        self.sorted.clear();
-        self.sorted.extend(self.groups.iter().map(|group| group.misfit));
-        let rank = self.sorted.len() * SURELY_CLEAR / 100;
-        let sure = rank::at(&mut self.sorted, rank).unwrap_or(f32::INFINITY);
-        let pixels = narrow(self.template.products.pixels);
+        self.scratch.sorted.clear();
+        self.scratch.sorted.extend(self.row_fit.groups.iter().map(|group| group.misfit));
+        let rank = self.scratch.sorted.len() * SURELY_CLEAR / 100;
+        let sure = rank::at(&mut self.scratch.sorted, rank).unwrap_or(f32::INFINITY);
+        let pixels = narrow(self.row_fit.template.products.pixels);
         let noise = noise * noise * (pixels + MANY_SIGMA * (2.0 * pixels).sqrt());
         noise.max(f32::min(UNLIKE * sure, MOST_UNLIKE * noise))
     }
 
     /// How far the edge of a clear row lies from the course at most \[px\].
     fn far_of_rows<T: Grey>(&mut self, scene: &Scene<'_, T>, limit: f32) -> f32 {
-        let stiffness = narrow(self.template.products.slope_slope);
-        let step = typical(&self.step).abs();
-        let weight = self.groups.first().map_or(1.0, |group| group.weight);
+        let stiffness = narrow(self.row_fit.template.products.slope_slope);
+        let step = typical(&self.values.step).abs();
+        let weight = self.row_fit.groups.first().map_or(1.0, |group| group.weight);
         let noise = scene.noise / (step * stiffness.sqrt() * weight.sqrt());
-        self.sorted.clear();
-        let likely = self.groups.iter().filter(|group| group.misfit <= limit);
-        self.sorted.extend(likely.map(|group| group.moved.abs()));
-        let median = rank::median(&mut self.sorted).unwrap_or(0.0);
+        self.scratch.sorted.clear();
+        let likely = self.row_fit.groups.iter().filter(|group| group.misfit <= limit);
+        self.scratch.sorted.extend(likely.map(|group| group.moved.abs()));
+        let median = rank::median(&mut self.scratch.sorted).unwrap_or(0.0);
         FAR_SIGMA * noise.max(1.48 * median)
     }
 
     fn clear_share(&self) -> f32 {
-        let clear = self.clear.iter().filter(|clear| **clear).count();
-        single(clear) / single(self.clear.len().max(1))
+        let clear = self.occlusion.clear.iter().filter(|clear| **clear).count();
+        single(clear) / single(self.occlusion.clear.len().max(1))
     }
 
     /// Longest run of rows that do not fit, but show the same edge where their
@@ -321,9 +328,11 @@ impl Tracer {
     fn elsewhere<T: Grey>(&self, scene: &Scene<'_, T>, limit: f32) -> f32 {
         let (mut longest, mut run) = (0.0f32, 0.0);
         let windows = self.sheet.windows();
-        for (number, (group, clear)) in self.groups.iter().zip(&self.clear).enumerate() {
+        for (number, (group, clear)) in
+            self.row_fit.groups.iter().zip(&self.occlusion.clear).enumerate()
+        {
             let window = &windows[number];
-            let at = self.picked[scene.bands.band_of(window.middle)];
+            let at = self.values.picked[scene.bands.band_of(window.middle)];
             let [path, before, step] = window.expected;
             if *clear || group.misfit <= limit || at.is_nan() || (at - path).abs() < ELSEWHERE_PX {
                 run = 0.0;
@@ -333,7 +342,7 @@ impl Tracer {
             let expected = Self::expected([at, before, step], noise);
             let mut plain = PlainSums::default();
             let pixels = (self.sheet.pixels(number).as_slice(), window.first);
-            let sums = self.template.hold(pixels, &expected, &mut plain);
+            let sums = self.row_fit.template.hold(pixels, &expected, &mut plain);
             let fits = sums.is_some_and(|sums| self.misfit(&sums, group.weight) <= limit);
             run = if fits { run + group.weight } else { 0.0 };
             longest = longest.max(run);
@@ -343,23 +352,23 @@ impl Tracer {
 
     /// Leads the course through the clear rows.
     fn follow<T: Grey>(&mut self, scene: &Scene<'_, T>) {
-        self.rough.clear();
+        self.scratch.rough.clear();
         let mut first = 0;
         for band in 0..scene.lines.len() {
             let (mut sum, mut n) = (0.0, 0.0);
-            while first < self.groups.len() && self.groups[first].band == band {
-                if self.clear[first] {
-                    sum += self.groups[first].moved;
+            while first < self.row_fit.groups.len() && self.row_fit.groups[first].band == band {
+                if self.occlusion.clear[first] {
+                    sum += self.row_fit.groups[first].moved;
                     n += 1.0;
                 }
                 first += 1;
             }
-            self.rough.push(if n > 0.0 { sum / n } else { f32::NAN });
+            self.scratch.rough.push(if n > 0.0 { sum / n } else { f32::NAN });
         }
         self.fill_rough();
-        for (at, &line) in self.rough.iter_mut().zip(scene.lines) {
-            *at += self.course.at(narrow(pool::middle(line)))[0];
+        for (at, &line) in self.scratch.rough.iter_mut().zip(scene.lines) {
+            *at += self.course.at(narrow(line.middle()))[0];
         }
-        self.course.redraw(scene.lines, &self.rough, &mut self.memory);
+        self.course.redraw(scene.lines, &self.scratch.rough, &mut self.scratch.course);
     }
 }

@@ -3,7 +3,7 @@
 //! share · (1 − share). A blurred step that is fitted to it lies aside of the edge.
 
 use super::Overlay;
-use super::shape::{Look, SHADING_SD};
+use super::look::{Look, SHADING_SD};
 use crate::numeric::blurred_step::StepTable;
 use crate::numeric::normal_equations::Normal;
 use crate::numeric::number::float;

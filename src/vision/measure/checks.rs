@@ -1,13 +1,16 @@
 //! What is not believed: edges that disagree with themselves or with each other,
 //! and steps that are too low.
 
-use super::{Way, Work};
+use super::pattern_limits::{STRONGEST_OF_LINES, STRONGEST_PATTERN};
+use super::work::{Way, Work};
+use crate::numeric::normal_distribution::ROOT_TWO_PI;
 use crate::numeric::number::float;
 use crate::numeric::rank;
 use crate::vision::gauge::EdgeKind;
 use crate::vision::ground::{Place, Side};
 use crate::vision::outlier;
 use crate::vision::reject::Reject;
+use crate::vision::row_range::RowRange;
 use crate::vision::strip::{Grey, Strip};
 use crate::vision::trace::Tracer;
 use crate::vision::width::WidthMeasurement;
@@ -46,20 +49,12 @@ pub(super) const WHOLE_SHARE: f64 = 0.95;
 /// The same where one edge was hidden and had to be located line by line.
 const LOST_SCATTER_PX: f64 = 0.5;
 
-/// Strongest pattern beside the bead, as a share of the contrast: a pattern of a third
-/// is measured, of a stronger one parts are taken for the bead.
-const STRONGEST_PATTERN: f64 = 0.37;
-/// The same where edges were located line by line: drawn widths beside a pattern of 0.25 and
-/// 0.31 were 53 and 22 px off. A real strand has up to 0.2, real printed lines up to 0.24.
-const STRONGEST_OF_LINES: f64 = 0.25;
 /// Share of a pattern beside an edge that counts for its place: at the edge it is half
 /// covered by the bead, and the widths of drawn beads tell a little less.
 const PATTERN_SHARE: f64 = 0.46;
 /// Pattern as a fraction of the contrast below which weights that know the texture leave
 /// nothing else of it: with both, z of compressed images of a quality above 65 is 0.86.
 const FAINT_PATTERN: f64 = 0.1;
-/// √(2π): the slope of a Gaussian flank is its height over that and its blur.
-const ROOT_TWO_PI: f64 = 2.506_628_274_631_000_5;
 /// Widest blur of an edge that is measured \[px\]: rendered motion, a box of 20.8 px,
 /// is measured without fault up to 7.4 px of blur, and was off by some pixels from
 /// 7.5 px on.
@@ -141,7 +136,7 @@ impl Work {
         for (((tracer, outwards), contrast), strength) in
             sides.into_iter().zip(self.contrasts).zip(&mut strengths)
         {
-            tracer.ground_variance = 0.0;
+            tracer.uncertainty.ground_variance = 0.0;
             if !tracer.is_on_ground {
                 continue;
             }
@@ -156,9 +151,10 @@ impl Work {
             // Rough edges know what the ground beside them leaves open, weights that know a
             // texture what a faint one does.
             let is_in_weights = tracer.knows_texture() && *strength < FAINT_PATTERN;
-            if tracer.mean_variance.is_none() && !is_in_weights {
+            if tracer.uncertainty.mean_variance.is_none() && !is_in_weights {
                 let px_per_grey = PATTERN_SHARE * ROOT_TWO_PI * tracer.blur_px / contrast;
-                tracer.ground_variance = pattern.mean_variance * px_per_grey * px_per_grey;
+                tracer.uncertainty.ground_variance =
+                    pattern.mean_variance * px_per_grey * px_per_grey;
             }
         }
         self.pattern_share = strengths[0].min(strengths[1]);
@@ -247,7 +243,7 @@ impl Work {
 }
 
 /// Where an edge lies on the caliper lines that show it.
-pub(super) fn place(tracer: &Tracer, lines: &[(usize, usize)], places: &mut Vec<Place>) {
+pub(super) fn place(tracer: &Tracer, lines: &[RowRange], places: &mut Vec<Place>) {
     let edges = tracer.edges().iter().zip(lines);
     places.clear();
     places.extend(edges.filter_map(|(edge, &rows)| Some(Place { rows, at: edge.as_ref()?.at })));

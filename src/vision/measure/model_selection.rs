@@ -3,9 +3,9 @@
 
 use std::ops::RangeInclusive;
 
-use super::judge::{STRANGE, WIDEST_BLUR_PX, WIDEST_MOTION_PX};
-use super::rough::WIDEST_ROUGH_PX;
-use super::{Way, Work};
+use super::checks::{STRANGE, WIDEST_BLUR_PX, WIDEST_MOTION_PX};
+use super::rough_edges::WIDEST_ROUGH_PX;
+use super::work::{Way, Work};
 use crate::vision::reject::Reject;
 use crate::vision::rough::RoughFit;
 use crate::vision::trace::Tracer;
@@ -94,6 +94,11 @@ impl Work {
         self.left.blur_px.max(self.right.blur_px) > WIDE_PX
     }
 
+    /// Whether the bead is too narrow for its level to be read free of its flanks.
+    fn is_narrow(&self) -> bool {
+        self.width_px <= NARROW_PX
+    }
+
     /// Whether more than a few places of an edge were sorted out, or some that surely show
     /// something else.
     pub(super) fn has_gaps(&self) -> bool {
@@ -112,7 +117,7 @@ impl Work {
     /// refused. Occluded ones are known, and grains taken for ground make rough ones higher.
     pub(super) fn may_be_grains(&self, refused: &Reject, fits: &[RoughFit; 2]) -> bool {
         let is_higher = matches!(refused, Reject::Occluded { .. }) && !self.is_no_higher(fits);
-        is_higher || fits.iter().any(|fit| fit.odd_share > fit.odd_within_share + FEW_ODD)
+        is_higher || fits.iter().any(|fit| fit.exceeds_texture(FEW_ODD))
     }
 
     /// Whether a rough edge is so much fainter than the blurred step that it is another.
@@ -184,12 +189,12 @@ impl Work {
         fits: &[RoughFit; 2],
         found: WidthMeasurement,
     ) -> WidthMeasurement {
-        if self.width_px <= NARROW_PX {
+        if self.is_narrow() {
             return found;
         }
         let may_be_grooved = fits.iter().any(|fit| fit.is_narrow_groove);
-        let is_doubted =
-            is_plain(fits) && (self.has_gaps() || may_be_grooved && self.has_two_grounds());
+        let is_doubted = are_clean(fits, GRAINS)
+            && (self.has_gaps() || may_be_grooved && self.has_two_grounds());
         let is_in_pattern = self.pattern_share > NOTABLE_PATTERN;
         let share = match self.way {
             Way::Steps if is_doubted || is_in_pattern => self.sigma_share(fits, &found).max(1.0),
@@ -205,7 +210,8 @@ impl Work {
     /// grounds that differ.
     fn off_rows_px(&self, fits: &[RoughFit; 2]) -> f64 {
         let sides = [(&self.left, &self.rough[0]), (&self.right, &self.rough[1])];
-        let shows_two_grounds = self.has_gaps() && self.has_two_grounds() && is_plain(fits);
+        let shows_two_grounds =
+            self.has_gaps() && self.has_two_grounds() && are_clean(fits, GRAINS);
         let off = [0, 1].map(|k| {
             let (found, rough) = sides[k];
             let is_fit = self.way == Way::Steps && found.misfit_of_a_row() < STRANGE;
@@ -237,7 +243,7 @@ impl Work {
         if self.is_wider(fits) || self.is_elsewhere() && self.is_fainter(fits) {
             return false;
         }
-        let two_levels = are_two_levels(fits);
+        let two_levels = are_clean(fits, FEW_ODD);
         // Texture that is known on both sides looks like a groove here and there.
         let knows_texture = self.left.knows_texture() && self.right.knows_texture();
         let hidden = !knows_texture && fits.iter().any(|fit| fit.is_narrow_groove);
@@ -250,8 +256,8 @@ impl Work {
         } else {
             // Grains here and there look like a groove in the mean over the gauge.
             let is_covered = self.left.is_covered() || self.right.is_covered();
-            let has_room = self.width_px > NARROW_PX;
-            let has_bays = two_levels && has_room && self.has_gaps() && self.is_no_higher(fits);
+            let has_bays =
+                two_levels && !self.is_narrow() && self.has_gaps() && self.is_no_higher(fits);
             !self.is_wide() && (has_bays || hidden && !is_covered)
         }
     }
@@ -263,17 +269,12 @@ fn is_part(tracer: &Tracer, step: f64) -> bool {
     step < PART_OF_LEVELS * (after - before).abs()
 }
 
-/// Whether neither grains nor sparks are seen about the edges.
-fn is_plain(fits: &[RoughFit; 2]) -> bool {
-    fits.iter().all(|fit| fit.odd_share < GRAINS)
-}
-
-/// Whether edges show bead and what lies outside, and no grains.
-fn are_two_levels(fits: &[RoughFit; 2]) -> bool {
-    fits.iter().all(|fit| fit.odd_share < FEW_ODD)
+/// Whether less than such a share of the pixels about either edge shows neither bead nor ground.
+fn are_clean(fits: &[RoughFit; 2], max_odd_share: f64) -> bool {
+    fits.iter().all(|fit| fit.odd_share < max_odd_share)
 }
 
 /// Whether more shows about an edge than bead with its texture and ground.
 pub fn has_grains(fit: &RoughFit) -> bool {
-    fit.odd_share > fit.odd_within_share + GRAINS
+    fit.exceeds_texture(GRAINS)
 }

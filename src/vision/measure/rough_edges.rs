@@ -1,13 +1,13 @@
 //! Beads whose edges are no blurred steps: torn ones, grooves, texture.
 
-use super::patterned::{check_pattern, doubt_of_blur};
-use super::{NEED_SHARE, Work, even};
+use super::pattern_limits::{check_pattern, in_texture};
+use super::uniformity;
+use super::work::{NEED_SHARE, Work};
 use crate::calibration::SurfaceMap;
 use crate::numeric::number::{float, narrow};
 use crate::vision::coarse::{LinePair, StepLine};
-use crate::vision::gauge::{EdgeKind, Polarity};
+use crate::vision::gauge::{EdgeKind, Polarity, WidthRangePx};
 use crate::vision::line::Line;
-use crate::vision::pool;
 use crate::vision::reject::Reject;
 use crate::vision::rough::{RoughFit, Scene};
 use crate::vision::strip::{Grey, Strip, View};
@@ -41,7 +41,7 @@ impl Work {
         &mut self,
         refused: &Reject,
         strip: &Strip<'_, T>,
-        range: (f32, f32),
+        range: WidthRangePx,
         view: &View,
         surface: &SurfaceMap,
     ) -> Result<WidthMeasurement, Reject> {
@@ -71,7 +71,7 @@ impl Work {
     pub(super) fn find_rough<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
-        range: (f32, f32),
+        range: WidthRangePx,
     ) -> Result<[RoughFit; 2], Reject> {
         let pair = match self.find_lines(strip, range) {
             // Holes within the bead that lie one behind the other look like ribs and texture.
@@ -92,7 +92,7 @@ impl Work {
             let mut line = Line::default();
             for (edge, &rows) in tracer.edges().iter().zip(&self.lines) {
                 if let Some(edge) = edge {
-                    line.add(pool::middle(rows) - middle, edge.at, edge.share);
+                    line.add(rows.middle() - middle, edge.at, edge.share);
                 }
             }
             let [at, next] = [0.0, 1.0].map(|row| line.at(row).0);
@@ -110,11 +110,11 @@ impl Work {
     pub(super) fn find_lines<T: Grey>(
         &mut self,
         strip: &Strip<'_, T>,
-        range: (f32, f32),
+        range: WidthRangePx,
     ) -> Result<LinePair, Reject> {
         let failed = Reject::NoPair { got: 0.0, need: NEED_SHARE };
-        let range = (LINE_SLACK * range.0, range.1 / LINE_SLACK);
-        let usual_px = (range.0 * range.1).sqrt();
+        let range = WidthRangePx { min: LINE_SLACK * range.min, max: range.max / LINE_SLACK };
+        let usual_px = (range.min * range.max).sqrt();
         vectors::widest(
             #[inline(always)]
             || self.coarse.look(strip, usual_px),
@@ -163,7 +163,7 @@ impl Work {
         if got < NEED_SHARE {
             return Err(Reject::NoPair { got, need: NEED_SHARE });
         }
-        even::check(&[left_fit, right_fit], even::middle_grey(strip, pair))?;
+        uniformity::check(&[left_fit, right_fit], uniformity::middle_grey(strip, pair))?;
         Ok([left_fit, right_fit])
     }
 
@@ -225,15 +225,6 @@ impl Work {
 fn with_flank(fit: RoughFit) -> RoughFit {
     let off_px = OFF_PER_BLUR * (fit.blur_px - WHOLE_FLANK_PX).max(0.0);
     RoughFit { variance: fit.variance + off_px * off_px, ..fit }
-}
-
-/// Edges of a textured bead whose mean profile shows none: without a groove beside it, dark
-/// places of the bead pass for a part of a flank that is too wide.
-pub(super) fn in_texture(pair: &LinePair, fits: [RoughFit; 2]) -> [RoughFit; 2] {
-    if pair.has_groove() {
-        return fits;
-    }
-    fits.map(|fit| RoughFit { variance: fit.variance * doubt_of_blur(fit.blur_px), ..fit })
 }
 
 /// Whether a frame was refused for what hides its edges, which may be grains.

@@ -1,9 +1,10 @@
 //! How far pixel noise and texture move the mean position of an edge.
 
-use super::Scene;
 use super::crossing::INSIDE_PX;
 use super::levels::{Crossings, DEPTH_SIGMA, LENGTH, Levels, OUTSIDE, Profile};
+use super::rough_input::Scene;
 use super::window::Windows;
+use crate::numeric::normal_distribution::ROOT_TWO_PI;
 use crate::numeric::number::whole;
 use crate::numeric::number::{float, narrow};
 use crate::vision::strip::Grey;
@@ -18,8 +19,6 @@ const FLANK_FRACTION: f64 = 0.2;
 /// deviations of the level from place to place: an edge that is drawn outwards by bright
 /// places finds more of them.
 const PATTERN_SIGMAS: f64 = 1.2;
-/// √(2π): the slope of a Gaussian flank is its height over that and its blur.
-const ROOT_TWO_PI: f64 = 2.506_628_274_631_000_5;
 
 /// What noise leaves open.
 #[derive(Debug, Clone, Copy)]

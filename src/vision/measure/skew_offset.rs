@@ -1,6 +1,6 @@
 //! What the skew of both edges' flanks makes of a width.
 
-use super::{Way, Work};
+use super::work::{Way, Work};
 use crate::vision::overlay::Look;
 use crate::vision::trace::Tracer;
 use crate::vision::width::Skew;

@@ -1,0 +1,10 @@
+//! What is known of the blur of an edge.
+
+/// Blur as the standard deviation of a Gaussian, and how sure that is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BlurEstimate {
+    /// The blur \[px\].
+    pub px: f64,
+    /// Its standard deviation \[px\].
+    pub sd_px: f64,
+}

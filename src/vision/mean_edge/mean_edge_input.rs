@@ -1,0 +1,61 @@
+//! What is looked at for an edge on the mean over its rows.
+
+use crate::numeric::number::{float, floor, narrow};
+use crate::vision::row_range::RowRange;
+use crate::vision::strip::{Grey, Strip};
+
+/// What is looked at.
+#[derive(Debug, Clone, Copy)]
+pub struct Scene<'a, T> {
+    /// The gauge's pixels.
+    pub strip: &'a Strip<'a, T>,
+    /// Rows of its caliper lines.
+    pub lines: &'a [RowRange],
+    /// Distance of the two edges \[px\].
+    pub width_px: f32,
+    /// Whether the bead lies after the edge.
+    pub bead_after: bool,
+    /// Whether the bead is brighter than what lies outside.
+    pub bright: bool,
+}
+
+impl<T: Grey> Scene<'_, T> {
+    /// Last column.
+    pub(super) fn last(&self) -> f64 {
+        float(self.strip.across - 1)
+    }
+
+    /// Where a row lies along the gauge: from −1 to 1.
+    pub(super) fn place(&self, row: usize) -> f64 {
+        let half = 0.5 * float(self.strip.along);
+        (float(row) + 0.5 - half) / half
+    }
+
+    /// Reads pixels of a row from the one at or before a position on; returns how far the
+    /// position lies from that towards the next one. Beyond the gauge its last pixel goes on.
+    #[inline(always)]
+    pub(super) fn fetch(&self, row: usize, from: f64, out: &mut [f32]) -> f32 {
+        let pixels = self.strip.row(row);
+        let of = |pixel: T| T::float(pixel.add_to(T::Sum::default()));
+        let first = floor(from);
+        let start = usize::try_from(first).ok();
+        if let Some(inside) = start.and_then(|start| pixels.get(start..start + out.len())) {
+            out.iter_mut().zip(inside).for_each(|(out, pixel)| *out = of(*pixel));
+        } else {
+            for (out, at) in out.iter_mut().zip(first..) {
+                *out = of(self.strip.nearest(row, at));
+            }
+        }
+        narrow(from - from.floor())
+    }
+
+    /// Sign by which a bright bead's grey levels and a dark one's are higher than the ground's.
+    pub(super) fn sign(&self) -> f64 {
+        if self.bright { 1.0 } else { -1.0 }
+    }
+
+    /// Direction from the edge into the bead.
+    pub(super) fn inwards(&self) -> f64 {
+        if self.bead_after { 1.0 } else { -1.0 }
+    }
+}

@@ -1,0 +1,162 @@
+//! What a first look at an edge tells: the step, how sure its blur is, what it leaves, and how far
+//! there is nothing else.
+
+use super::REACH;
+use super::step::{Extent, Flank, Flanks, Step};
+use crate::numeric::blurred_step::StepTable;
+use crate::vision::blur_estimate::BlurEstimate;
+
+/// How far from the edge samples are fitted, in blurs and pixels beside.
+const FIT_BLURS: f64 = 4.5;
+const FIT_BESIDE_PX: f64 = 2.0;
+/// Misfit from which on the edge alone leaves more than noise does.
+const STRANGE: f64 = 1.3;
+/// Shading that is usual close to an edge, as a standard deviation \[1/px\].
+pub const SHADING_SD: f64 = 0.02;
+/// Steps of a fit at most.
+pub const MAX_STEPS: usize = 16;
+
+/// A first look at an edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// The step.
+    pub step: Step,
+    /// Standard deviation of its blur \[px\].
+    pub blur_sd: f64,
+    /// Change of the level before and after it \[1/px away from it\].
+    pub(super) shading: [f64; 2],
+    /// Standard deviation of a pixel, in shares of the step.
+    pub(super) pixel_noise: f64,
+    /// Standard deviation of a row's samples about the step before the fit's last move, in
+    /// shares of it.
+    pub(super) noise: f64,
+    /// The same after it, where each phase has a place and levels of its own.
+    pub(super) residual: f64,
+    /// Number of the phases that have rows.
+    pub(super) phases: f64,
+    /// How far there is nothing but this edge.
+    pub room: Extent,
+    /// Steps beside it that reach into its pixels.
+    pub(super) flanks: Flanks,
+    /// What they and the blur add to the variance of its place \[px²\]; 0 where
+    /// there are none.
+    pub(super) doubt: f64,
+}
+
+/// Distances from an edge between which nothing else lies \[px\].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Distances {
+    /// Beyond the flank.
+    pub near: usize,
+    /// The end.
+    pub far: usize,
+}
+
+impl Look {
+    /// Samples beside the edge on either side.
+    pub fn beside(&self) -> [Distances; 2] {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "within the window"
+        )]
+        let whole = |distance: f64| distance.max(0.0) as usize;
+        let near = 3.0 * self.step.blur + 1.0;
+        let to = |room: f64| whole(room).min(REACH);
+        [
+            Distances { near: whole((near - self.step.at).ceil()), far: to(self.room.before) },
+            Distances { near: whole((near + self.step.at).ceil()), far: to(self.room.after) },
+        ]
+    }
+
+    /// Standard deviation of a sample, in shares of the step.
+    pub fn pixel_noise(&self) -> f64 {
+        self.pixel_noise
+    }
+
+    /// Its blur.
+    pub fn blur(&self) -> BlurEstimate {
+        BlurEstimate { px: self.step.blur, sd_px: self.blur_sd }
+    }
+
+    /// Mean square of the residuals about the edge, in variances of their noise: at
+    /// least 1. Each phase has a place and levels of its own, so that they are those of the
+    /// step's shape.
+    pub fn misfit(&self) -> f64 {
+        (self.residual / self.pixel_noise).powi(2)
+    }
+
+    /// Whether the step leaves more than noise does.
+    pub fn is_strange(&self) -> bool {
+        self.misfit() >= STRANGE
+    }
+
+    /// The misfit of one place and levels for all phases.
+    pub fn misfit_of_all(&self) -> f64 {
+        (self.noise / self.pixel_noise).powi(2)
+    }
+
+    /// Number of samples about the edge that the misfit is the mean of.
+    pub fn samples(&self) -> f64 {
+        let reach = FIT_BLURS * self.step.blur + FIT_BESIDE_PX;
+        let Extent { before, after } = self.room;
+        self.phases * (reach.min(before) + reach.min(after))
+    }
+
+    /// Ends of the samples about the edge that are fitted \[px from the path\].
+    #[inline(always)]
+    pub(super) fn fitted(&self) -> (f64, f64) {
+        let reach = FIT_BLURS * self.step.blur + FIT_BESIDE_PX;
+        let from = (self.step.at - reach.min(self.room.before)).max(-place_limit());
+        let to = (self.step.at + reach.min(self.room.after)).min(place_limit());
+        (from, to)
+    }
+
+    /// Derivatives of the level at a distance from the path for the step's place
+    /// and blur, its two levels and the two shadings, and the level itself,
+    /// without flanks.
+    #[inline(always)]
+    pub(super) fn linear_at(&self, table: &StepTable, at: f64) -> ([f64; 6], f64) {
+        let Self { step: edge, shading, .. } = self;
+        let per_blur = 1.0 / edge.blur;
+        let z = (at - edge.at) * per_blur;
+        let (step, density, slopes) = table.with_slopes(z);
+        let depth = slopes.map(|level| level * edge.blur);
+        let slope = (edge.after - edge.before) * density * per_blur;
+        let level = edge.before * (1.0 - step)
+            + edge.after * step
+            + shading[0] * depth[0]
+            + shading[1] * depth[1];
+        ([-slope, -slope * z, 1.0 - step, step, depth[0], depth[1]], level)
+    }
+
+    /// The same look up to half-way to the steps beside the edge.
+    pub(super) fn without_flanks(&self) -> Self {
+        let half = |flank: &Option<Flank>, room: f64| {
+            flank.as_ref().map_or(room, |flank| 0.5 * (flank.at - self.step.at).abs())
+        };
+        let Flanks([before, after]) = &self.flanks;
+        let room =
+            Extent { before: half(before, self.room.before), after: half(after, self.room.after) };
+        Self { room, flanks: Flanks::default(), doubt: 0.0, ..*self }
+    }
+
+    /// The same look where texture makes samples less sure than noise does:
+    /// `noise` is what independent ones as unsure would have.
+    pub fn in_texture(self, noise: f64) -> Self {
+        let blur_sd = self.blur_sd * (noise / self.noise).max(1.0);
+        Self {
+            blur_sd,
+            pixel_noise: noise,
+            noise: noise.max(self.noise),
+            residual: noise.max(self.residual),
+            ..self
+        }
+    }
+}
+
+/// Farthest place of a sample from the path \[px\].
+#[expect(clippy::cast_precision_loss, reason = "the window is short")]
+pub fn place_limit() -> f64 {
+    REACH as f64 - 1.0
+}

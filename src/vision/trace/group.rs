@@ -1,0 +1,29 @@
+//! A few rows that are held against an edge together.
+
+use crate::vision::template::RowSums;
+
+/// A few rows that are held against the edge together.
+#[derive(Debug, Clone, Copy)]
+pub struct Group {
+    /// The band that they belong to.
+    pub band: usize,
+    /// Number of rows.
+    pub weight: f32,
+    /// How far the rows were sampled beyond the path \[px\].
+    pub ahead: f32,
+    /// What they say.
+    pub sums: RowSums,
+    /// Place of the edge beside the path \[px\].
+    pub moved: f32,
+    /// Sum of the squares of what does not fit, as if of a single row
+    /// \[grey levels²\].
+    pub misfit: f32,
+}
+
+impl Group {
+    /// Rows that are not to be held.
+    pub fn hidden(band: usize, weight: f32) -> Self {
+        let (ahead, moved, misfit) = (0.0, 0.0, f32::INFINITY);
+        Self { band, weight, ahead, sums: RowSums::default(), moved, misfit }
+    }
+}

@@ -1,0 +1,112 @@
+//! What a tracer keeps of an edge, by what it is for.
+
+use super::band_sums::BandSums;
+use super::group::Group;
+use crate::vision::template::textured::Scatter;
+use crate::vision::template::{PlainSums, Template};
+use crate::vision::texture::Texture;
+use crate::vision::whiten::Whitener;
+
+/// What is known of an edge.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) enum State {
+    /// Nothing yet.
+    #[default]
+    Unseen,
+    /// Nothing covers it, as far as it shows.
+    Open,
+    /// It is covered in part, and located from its clear rows alone.
+    Covered,
+    /// It seems to be covered, but no clear rows were found: it is located as if
+    /// it were open.
+    Hidden,
+}
+
+/// What is known of an edge band by band.
+#[derive(Debug, Clone, Default)]
+pub(super) struct BandValues {
+    /// Places that were picked \[px\]; NaN where there is none.
+    pub(super) picked: Vec<f32>,
+    /// Places of the path \[px\].
+    pub(super) path: Vec<f32>,
+    /// Level before the edge \[grey levels\].
+    pub(super) before: Vec<f32>,
+    /// Step to the level after it \[grey levels\].
+    pub(super) step: Vec<f32>,
+}
+
+/// Whether an edge winds between bands.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Winding {
+    /// Whether the course was picked from line to line.
+    pub(super) is_followed: bool,
+    /// How far bands lie off the line between their neighbours; more than 1 where the
+    /// edge winds between them.
+    pub(super) excess: f32,
+}
+
+/// The texture beside an edge, and weights that know it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Textured {
+    pub(super) texture: Option<Texture>,
+    pub(super) whitener: Whitener,
+    /// How far places scatter with these weights.
+    pub(super) scatter: Option<Scatter>,
+}
+
+/// Rows held against the edge.
+#[derive(Debug, Clone, Default)]
+pub(super) struct RowFit {
+    pub(super) template: Template,
+    /// Rows that were held together.
+    pub(super) groups: Vec<Group>,
+    /// Plain pixels of each band.
+    pub(super) plain: Vec<PlainSums>,
+    /// Sums over the rows of each band.
+    pub(super) solved: Vec<BandSums>,
+}
+
+/// Which rows of an edge that is covered in part show it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Occlusion {
+    /// Rough places that are free to agree, and those of the best course yet.
+    pub(super) free: Vec<f32>,
+    pub(super) best_free: Vec<f32>,
+    /// Bands that agree with most of the others.
+    pub(super) trusted: Vec<bool>,
+    /// Groups that show the edge and nothing else; none where that is not
+    /// asked.
+    pub(super) clear: Vec<bool>,
+    /// Whether rows are sorted by that, each for itself.
+    pub(super) sort_rows: bool,
+}
+
+/// Scratch memory.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scratch {
+    /// Rough values, one a band or a line.
+    pub(super) rough: Vec<f32>,
+    pub(super) sorted: Vec<f32>,
+    /// For a course that is drawn anew.
+    pub(super) course: Vec<[f32; 3]>,
+    pub(super) scatter: Vec<f64>,
+}
+
+/// How sure the places of an edge are, beside what each of them says.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Uncertainty {
+    /// Variance of the whole edge's position that all places share, from
+    /// shading that is not known better \[px²\].
+    pub common_variance: f64,
+    /// Variance of the mean position, where it is known apart from that of the
+    /// places \[px²\].
+    pub mean_variance: Option<f64>,
+    /// Variance of the whole edge's position from the pattern beside the bead \[px²\].
+    pub ground_variance: f64,
+    /// Standard deviation of the smoothing along the bead that places have passed,
+    /// beside the mean over a line's rows \[px\].
+    pub along_px: f64,
+    /// Fraction of the places' variance that differs from place to place; the rest moves
+    /// the whole edge.
+    pub lines_fraction: f64,
+}
