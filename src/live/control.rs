@@ -1,8 +1,11 @@
 //! The control thread: waits for what happens, for the next setpoint's time and
 //! for the next step of the extruder side, and lets the runner answer.
 
+mod ending;
 mod extruder;
+mod extruder_watch;
 mod frames;
+mod port;
 mod robot;
 mod steps;
 
@@ -31,34 +34,13 @@ use crate::run::ports::RecordError;
 use crate::run::runner::{Handled, Runner};
 use crate::width_control::limiter::Limits;
 
-pub use extruder::ExtruderWatch;
-pub use robot::LinkPort;
+pub use ending::Ending;
+pub use extruder_watch::ExtruderWatch;
+pub use port::LinkPort;
 pub use steps::StepsWatch;
 
 /// Longest wait for the robot to say that it has stopped.
 const FAREWELL: Span = Span::from_millis(600);
-
-/// Why a run ended.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Ending {
-    /// Somebody asked for it.
-    Asked,
-    /// Its time was over.
-    TimeOver,
-    /// The source had no more frames.
-    LastFrame,
-    /// The course of steps was over, or the bead was before it.
-    StepsOver,
-    /// The camera failed, and the controller has given up.
-    CameraLost(String),
-    /// What happened could not be recorded.
-    RecordingLost(String),
-    /// The robot's limits are narrower than the cell's.
-    RobotLimits(String),
-    /// The extruder takes another quantity than the cell commands, or not all
-    /// of what the cell allows.
-    ExtruderUnfit(String),
-}
 
 /// Where events come from.
 pub struct Sources<'a> {

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 
+use super::dialect::{Dialect, EventOf, Heard, LinkEvent};
 use super::incoming::{Incoming, Lost, Why};
 use super::outgoing::{Outgoing, write_line};
-use super::{Dialect, EventOf, Heard, LinkEvent};
 use crate::core::time::{Span, Stamp};
 use crate::link::PcLine;
 

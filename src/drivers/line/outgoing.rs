@@ -5,7 +5,9 @@ use std::net::{Shutdown, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::{Dialect, LinkTiming, Unsent, Written};
+use super::dialect::Dialect;
+use super::timing::LinkTiming;
+use super::written::{Unsent, Written};
 use crate::io::clock::RunClock;
 use crate::link::PcLine;
 

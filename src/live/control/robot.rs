@@ -1,44 +1,12 @@
-//! The robot's part of the control thread: its link as the runner's port, and
-//! what it reports.
+//! The robot's part of the control thread: what it reports.
 
 use std::sync::atomic::Ordering;
 
-use super::{Ending, Loop};
-use crate::control::step::Command;
+use super::Loop;
+use super::ending::Ending;
 use crate::core::robot::RobotLimits;
-use crate::core::time::Stamp;
-use crate::drivers::robot::{LinkClient, RobotEvent, Written};
-use crate::run::ports::RobotPort;
+use crate::drivers::robot::RobotEvent;
 use crate::width_control::limiter::Limits;
-
-/// The link as the runner's robot, which remembers when it last wrote.
-pub struct LinkPort {
-    client: LinkClient,
-    pub(super) written: Option<Written>,
-}
-
-impl LinkPort {
-    /// Over a link.
-    pub fn new(client: LinkClient) -> Self {
-        Self { client, written: None }
-    }
-
-    /// Says good-bye.
-    pub fn close(self) {
-        self.client.close();
-    }
-}
-
-impl RobotPort for LinkPort {
-    fn send(&mut self, _now: Stamp, command: Command) -> Option<u64> {
-        self.written = self
-            .client
-            .send(command)
-            .inspect_err(|reason| tracing::debug!(%reason, ?command, "not sent to the robot"))
-            .ok();
-        self.written.map(|written| written.seq)
-    }
-}
 
 impl Loop<'_> {
     /// Hands the controller what the robot reports.

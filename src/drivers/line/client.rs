@@ -1,0 +1,95 @@
+//! The other end of a TCP connection that is kept up.
+
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
+
+use super::connection;
+use super::dialect::{Dialect, EventOf};
+use super::outgoing::{Open, Outgoing};
+use super::timing::LinkTiming;
+use super::written::{Unsent, Written};
+use crate::io::clock::RunClock;
+
+/// Longest wait for the connection's thread when closing. Only a name server
+/// or a host that does not answer takes that long.
+const LONGEST_JOIN: Duration = Duration::from_secs(2);
+
+/// The other end of a TCP connection that is kept up.
+#[derive(Debug)]
+pub struct Client<D: Dialect> {
+    outgoing: Arc<Outgoing<D>>,
+    thread: Option<Running>,
+}
+
+#[derive(Debug)]
+struct Running {
+    handle: JoinHandle<()>,
+    /// Dropped to end the wait between two connections.
+    quit: Sender<()>,
+    /// Closed by the thread when it ends.
+    ended: Receiver<()>,
+}
+
+impl<D: Dialect> Client<D> {
+    /// Starts to connect to `address`, `host:port`. `events` should be
+    /// unbounded: where it is full the thread waits, and where its receiver is
+    /// gone the thread ends. Fails where the system gives no thread.
+    pub fn start(
+        address: String,
+        timing: LinkTiming,
+        clock: RunClock,
+        events: Sender<EventOf<D>>,
+    ) -> std::io::Result<Self> {
+        let outgoing = Arc::new(Outgoing::new(address, timing, clock));
+        let (quit, quitting) = bounded(0);
+        let (ending, ended) = bounded::<()>(0);
+        let shared = Arc::clone(&outgoing);
+        let body = move || {
+            connection::keep_up(&shared, &events, &quitting);
+            drop(ending);
+        };
+        let handle = std::thread::Builder::new().name(format!("{}-link", D::NAME)).spawn(body)?;
+        Ok(Self { outgoing, thread: Some(Running { handle, quit, ended }) })
+    }
+
+    /// Writes the line that `line` makes of what is known of the present
+    /// connection, and counts it. Blocks for [`LinkTiming::write`] at most; a
+    /// write that takes longer closes the connection.
+    pub fn send<E: From<Unsent>>(
+        &self,
+        line: impl FnOnce(&Open<D>) -> Result<String, E>,
+    ) -> Result<Written, E> {
+        self.outgoing.send(line)
+    }
+
+    /// Whether the other side has answered `HELLO` on the present connection.
+    pub fn connected(&self) -> bool {
+        self.outgoing.connected()
+    }
+
+    /// Says `BYE` and ends the thread. What was commanded last runs out.
+    pub fn close(mut self) {
+        self.end();
+    }
+
+    fn end(&mut self) {
+        let Some(Running { handle, quit, ended }) = self.thread.take() else { return };
+        self.outgoing.close();
+        drop(quit);
+        // Nothing is ever sent on it: it either times out or is closed.
+        if ended.recv_timeout(LONGEST_JOIN) == Err(RecvTimeoutError::Timeout) {
+            tracing::warn!("the {} link is still trying to connect; left to itself", D::NAME);
+        } else if handle.join().is_err() {
+            tracing::error!("the thread of the {} link had failed", D::NAME);
+        }
+    }
+}
+
+impl<D: Dialect> Drop for Client<D> {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
