@@ -13,7 +13,7 @@ use crate::extruder::feedforward::FeedforwardError;
 use crate::extruder::pressure::PressureError;
 use crate::io::progress::Progress;
 use crate::numeric::lti::ModelError;
-use crate::report::run::whole_page;
+use crate::report::html::whole_page;
 use crate::sim::cell::SimError;
 use crate::sim::render::RenderError;
 use summary::Summary;

@@ -3,25 +3,27 @@
 use maud::{Markup, html};
 
 use super::corner::Around;
-use crate::report::run::area::{Area, XAxis};
-use crate::report::run::palette;
-use crate::report::run::palette::Ink;
-use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
-use crate::report::run::sections::legend;
-use crate::report::run::series::series;
+use crate::report::chart::area::{Area, XAxis};
+use crate::report::chart::legend::legend;
+use crate::report::chart::palette;
+use crate::report::chart::palette::Ink;
+use crate::report::chart::plot::{Layer as Drawn, Plot, y_range};
+use crate::report::chart::range::Range;
+use crate::report::chart::series::Series;
 use crate::studies::bcs_thesis as plant;
 use crate::studies::bcs_thesis::corner::{BEAD, Drive, JUDGED_MM, Row};
 use crate::studies::bcs_thesis::fit_table::{FitRow, FitTable};
 use crate::studies::bcs_thesis::on_off::{Compared, Run};
 
 /// What is drawn once more, more closely \[s\].
-const CLOSER_S: (f64, f64) = (40.0, 60.0);
+const CLOSER_S: Range = Range::new(40.0, 60.0);
 
 /// A curve, its name and its colour.
 type Curve<'a> = (&'a [(f64, f64)], &'static str, Ink);
 
 fn plot(y_title: &str, axis: &XAxis, curves: &[Curve<'_>], level: Option<f64>) -> Markup {
-    let drawn: Vec<_> = curves.iter().map(|(points, ..)| series(points)).collect();
+    let drawn: Vec<Series> =
+        curves.iter().map(|(points, ..)| points.iter().copied().collect()).collect();
     let shown: Vec<_> = drawn.iter().collect();
     let levels: Vec<f64> = level.into_iter().collect();
     let mut layers: Vec<Drawn<'_>> =
@@ -42,7 +44,7 @@ pub fn fits(table: &FitTable) -> Markup {
         table.example.iter().map(|row| (row[0], row[which])).collect()
     };
     let (measured, predicted) = (of(1), of(2));
-    let axis = XAxis::time((0.0, measured.last().map_or(1.0, |(t, _)| *t)));
+    let axis = XAxis::time(Range::new(0.0, measured.last().map_or(1.0, |(t, _)| *t)));
     let flows = [
         (measured.as_slice(), "simulated with what no model tells", palette::FLOW),
         (predicted.as_slice(), "fitted model", palette::MODEL),
@@ -62,7 +64,7 @@ pub fn fits(table: &FitTable) -> Markup {
         .collect();
     let title = format!("poles,zeros – {}", names.join("   "));
     #[expect(clippy::cast_precision_loss, reason = "eight models")]
-    let range = (1.0, table.rows.len() as f64);
+    let range = Range::new(1.0, table.rows.len() as f64);
     html! {
         (plot("flow about its mean [mm³/s]", &axis, &flows, None))
         (plot("fit [%]", &XAxis { title, range, divisor: 1.0 }, &fits, None))
@@ -82,7 +84,11 @@ pub fn runs(thesis: &Compared, ours: &Compared) -> Markup {
         ]
     };
     let near = |run: &Run| -> Vec<(f64, f64)> {
-        run.area.iter().copied().filter(|(t, _)| (CLOSER_S.0..=CLOSER_S.1).contains(t)).collect()
+        run.area
+            .iter()
+            .copied()
+            .filter(|(t, _)| (CLOSER_S.min..=CLOSER_S.max).contains(t))
+            .collect()
     };
     let (theirs, best_near) = (near(on), near(best));
     let closer = [
@@ -113,17 +119,18 @@ pub fn exact([thesis, ours]: &[Compared; 2]) -> Markup {
         (theirs.as_slice(), "the thesis' controller", palette::PAPER),
         (best.as_slice(), "ours", palette::OURS),
     ];
-    let axis = XAxis::time((plant::on_off::JUDGED_FROM_S, time(&thesis.example[0]).range.1));
+    let axis =
+        XAxis::time(Range::new(plant::on_off::JUDGED_FROM_S, time(&thesis.example[0]).range.max));
     plot("section − 45 [mm²]", &axis, &curves, None)
 }
 
 fn time(run: &Run) -> XAxis {
-    XAxis::time((0.0, run.area.last().map_or(1.0, |(t, _)| *t)))
+    XAxis::time(Range::new(0.0, run.area.last().map_or(1.0, |(t, _)| *t)))
 }
 
 /// What a camera can do, beside its bound.
 pub fn sensing(found: &[(f64, f64)], bound: &[(f64, f64)]) -> Markup {
-    let range = (0.0, bound.last().map_or(1.0, |(mm, _)| *mm));
+    let range = Range::new(0.0, bound.last().map_or(1.0, |(mm, _)| *mm));
     let axis = XAxis { title: "camera behind the nozzle [mm]".to_owned(), range, divisor: 1.0 };
     let curves = [(bound, "bound", palette::LIMIT), (found, "ours", palette::OURS)];
     plot("area RMSE, off over on", &axis, &curves, None)
@@ -142,9 +149,9 @@ pub fn corner(rows: &[Row], runs: &[Around; 3]) -> Markup {
         (constant.as_slice(), "a constant extruder over ours", palette::PAPER),
         (proportional.as_slice(), "a proportional extruder over ours", palette::DEMAND),
     ];
-    let range = (0.0, rows.last().map_or(1.0, |row| row.budget_s));
+    let range = Range::new(0.0, rows.last().map_or(1.0, |row| row.budget_s));
     let time = XAxis { title: "time that may be added [s]".to_owned(), range, divisor: 1.0 };
-    let path = XAxis::path((-JUDGED_MM, JUDGED_MM));
+    let path = XAxis::path(Range::new(-JUDGED_MM, JUDGED_MM));
     let inks = [palette::PAPER, palette::DEMAND, palette::OURS];
     let over = |pick: fn(&Around) -> &[(f64, f64)]| -> Vec<Curve<'_>> {
         runs.iter().zip(inks).map(|(run, ink)| (pick(run), run.name, ink)).collect()

@@ -2,13 +2,14 @@
 
 use maud::{Markup, html};
 
-use crate::report::run::area::{Area, XAxis};
-use crate::report::run::palette;
-use crate::report::run::palette::Ink;
-use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
-use crate::report::run::sections::legend;
-use crate::report::run::series::Series;
-use crate::report::run::series::series;
+use crate::report::chart::area::{Area, XAxis};
+use crate::report::chart::legend::legend;
+use crate::report::chart::palette;
+use crate::report::chart::palette::Ink;
+use crate::report::chart::plot::{Layer as Drawn, Plot, y_range};
+use crate::report::chart::range::Range;
+use crate::report::chart::series::Series;
+
 use crate::studies::ma2026::{Course, Factors};
 
 /// Ticks from point to point of a drawing.
@@ -18,7 +19,7 @@ const DRAWN_EVERY: usize = 4;
 pub type Named = (&'static str, Ink, Course);
 
 /// Pressure and screw speed of some laws, with the target.
-pub fn courses(drawn: &[Named], range: (f64, f64)) -> Markup {
+pub fn courses(drawn: &[Named], range: Range) -> Markup {
     html! {
         (curves(drawn, range, "pressure [MPa]", |course, at| course.pressure.get(at).copied()))
         (curves(drawn, range, "screw speed [rpm]", |course, at| course.speed.get(at).copied()))
@@ -28,7 +29,7 @@ pub fn courses(drawn: &[Named], range: (f64, f64)) -> Markup {
 /// One quantity of some laws; with the pressure the target, too.
 pub fn curves(
     drawn: &[Named],
-    range: (f64, f64),
+    range: Range,
     y_title: &str,
     value: impl Fn(&Course, usize) -> Option<f64>,
 ) -> Markup {
@@ -75,21 +76,20 @@ pub fn singles(drawn: &[Course]) -> Markup {
         .zip(drawn)
         .map(|(((name, _), ink), course)| (name, ink, course.clone()))
         .collect();
-    courses(&named, (0.0, 5.0))
+    courses(&named, Range::new(0.0, 5.0))
 }
 
 fn thinned(
     course: &Course,
-    (from_s, to_s): (f64, f64),
+    range: Range,
     value: &impl Fn(&Course, usize) -> Option<f64>,
 ) -> Series {
-    let points: Vec<(f64, f64)> = course
+    course
         .time_s
         .iter()
         .enumerate()
         .step_by(DRAWN_EVERY)
-        .filter(|(_, t)| (from_s..=to_s).contains(*t))
+        .filter(|(_, t)| (range.min..=range.max).contains(*t))
         .filter_map(|(at, t)| value(course, at).map(|value| (*t, value)))
-        .collect();
-    series(&points)
+        .collect()
 }

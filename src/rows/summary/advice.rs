@@ -6,7 +6,7 @@
 //! held against one with 80 grey levels of contrast, 4 of noise and a blur of
 //! 1.5 px, for which the table of accuracy holds.
 
-use super::summary::HintSummary;
+use super::image_quality::HintSummary;
 
 const CONTRAST_GREY: f64 = 80.0;
 const NOISE_GREY: f64 = 4.0;

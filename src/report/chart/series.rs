@@ -2,6 +2,8 @@
 //! bucket that keeps their smallest and their largest, so that no spike is
 //! lost.
 
+use super::range::Range;
+
 /// A point of a curve, in the units of its axes.
 pub type Point = (f64, f64);
 
@@ -102,19 +104,19 @@ impl Series {
     }
 
     /// Smallest and largest value.
-    pub fn range(&self) -> Option<(f64, f64)> {
+    pub fn range(&self) -> Option<Range> {
         self.buckets
             .iter()
-            .map(|bucket| (bucket.low.1, bucket.high.1))
-            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+            .map(|bucket| Range::new(bucket.low.1, bucket.high.1))
+            .reduce(Range::joined)
     }
 
     /// Smallest and largest x.
-    pub fn extent(&self) -> Option<(f64, f64)> {
+    pub fn extent(&self) -> Option<Range> {
         self.buckets
             .iter()
-            .map(|bucket| (bucket.first_x, bucket.last_x))
-            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+            .map(|bucket| Range::new(bucket.first_x, bucket.last_x))
+            .reduce(Range::joined)
     }
 }
 
@@ -134,12 +136,14 @@ pub fn unbroken(points: &[Point]) -> Vec<&[Point]> {
 }
 
 /// Points as a curve that can be drawn.
-pub fn series(points: &[(f64, f64)]) -> Series {
-    let mut series = Series::default();
-    for (x, y) in points {
-        series.push(*x, *y);
+impl FromIterator<Point> for Series {
+    fn from_iter<I: IntoIterator<Item = Point>>(points: I) -> Self {
+        let mut series = Self::default();
+        for (x, y) in points {
+            series.push(x, y);
+        }
+        series
     }
-    series
 }
 
 #[cfg(test)]
@@ -154,8 +158,8 @@ mod tests {
             series.push(point.0, point.1);
         }
         assert_eq!(series.points(), [(0.0, 1.0), (1.0, 5.0), (3.0, 2.0)]);
-        assert_eq!(series.range(), Some((1.0, 5.0)));
-        assert_eq!(series.extent(), Some((0.0, 3.0)));
+        assert_eq!(series.range(), Some(Range::new(1.0, 5.0)));
+        assert_eq!(series.extent(), Some(Range::new(0.0, 3.0)));
     }
 
     #[test]
@@ -188,7 +192,7 @@ mod tests {
             }
             let least = values.iter().copied().fold(f64::INFINITY, f64::min);
             let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            prop_assert_eq!(series.range(), Some((least, largest)));
+            prop_assert_eq!(series.range(), Some(Range::new(least, largest)));
             prop_assert!(series.points().len() <= 2000);
         }
     }

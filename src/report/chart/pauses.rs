@@ -6,8 +6,9 @@ use std::fmt::Write as _;
 use maud::{Markup, html};
 
 use super::area::{Area, round};
-use super::axis::{Scale, with_margin};
+use super::axis::Scale;
 use super::palette::Ink;
+use super::range::Range;
 use super::series::Point;
 
 /// Pauses that the axis names \[s\].
@@ -38,9 +39,9 @@ pub fn over_pauses(area: Area, y_title: &str, layers: &[Drawn<'_>]) -> Markup {
     let longest_s = all().map(|(idle_s, _)| *idle_s).fold(1.0, f64::max);
     let most = all().map(|(_, value)| *value).fold(0.0, f64::max);
     let low = all().map(|(_, value)| *value).fold(0.0, f64::min);
-    let (_, high) = with_margin((low, most), 0.06);
-    let x = Scale::linear((0.0, place(1.05 * longest_s)), area.across());
-    let y = Scale::linear((low, high), area.upwards());
+    let high = Range::new(low, most).with_margin(0.06).max;
+    let x = Scale::linear(Range::new(0.0, place(1.05 * longest_s)), area.across());
+    let y = Scale::linear(Range::new(low, high), area.upwards());
     let shown = TICKS_S.iter().filter(|tick| **tick <= 1.05 * longest_s);
     let ticks: Vec<(f64, String)> = shown.map(|tick| (place(*tick), tick.to_string())).collect();
     area.svg(
@@ -82,7 +83,7 @@ fn draw(layer: &Drawn<'_>, x: &Scale, y: &Scale) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::run::palette;
+    use crate::report::chart::palette;
 
     #[test]
     fn every_pause_has_its_place() {

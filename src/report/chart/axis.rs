@@ -1,5 +1,17 @@
 //! Axes: round ticks, and from values to places on the page.
 
+use super::range::Range;
+
+/// Where an axis begins and ends on the page \[px of the drawing\]; upwards it begins at
+/// the larger number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Where its smallest value stands.
+    pub from: f64,
+    /// Where its largest value stands.
+    pub to: f64,
+}
+
 /// A linear or logarithmic map from values to a stretch of the page.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
@@ -11,16 +23,18 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Values `low..=high` onto `from..=to`. A range without extent is widened.
-    pub fn linear((low, high): (f64, f64), (from, to): (f64, f64)) -> Self {
-        let (low, high) = widened(low, high);
+    /// Values onto a part of the page. A range without extent is widened.
+    pub fn linear(values: Range, page: Extent) -> Self {
+        let (low, high) = widened(values.min, values.max);
+        let Extent { from, to } = page;
         Self { low, high, from, to, log: false }
     }
 
     /// The same for positive values on a logarithmic axis.
-    pub fn log((low, high): (f64, f64), (from, to): (f64, f64)) -> Self {
-        let low = low.max(1e-9);
-        let high = if high > low { high } else { low * 2.0 };
+    pub fn log(values: Range, page: Extent) -> Self {
+        let low = values.min.max(1e-9);
+        let high = if values.max > low { values.max } else { low * 2.0 };
+        let Extent { from, to } = page;
         Self { low, high, from, to, log: true }
     }
 
@@ -35,8 +49,8 @@ impl Scale {
     }
 
     /// Smallest and largest value.
-    pub fn range(&self) -> (f64, f64) {
-        (self.low, self.high)
+    pub fn range(&self) -> Range {
+        Range::new(self.low, self.high)
     }
 
     /// Round values within the range, about `wanted` of them, with their
@@ -81,12 +95,6 @@ impl Scale {
     }
 }
 
-/// A range with a margin of this share of its extent on both sides.
-pub fn with_margin((low, high): (f64, f64), share: f64) -> (f64, f64) {
-    let margin = (high - low) * share;
-    (low - margin, high + margin)
-}
-
 fn widened(low: f64, high: f64) -> (f64, f64) {
     let least = (low.abs().max(high.abs()) * 1e-6).max(1e-6);
     if high - low > least {
@@ -122,30 +130,35 @@ mod tests {
 
     #[test]
     fn ticks_are_round() {
-        let page = (0.0, 100.0);
-        assert_eq!(labels(Scale::linear((0.0, 20.0), page), 5), ["0", "5", "10", "15", "20"]);
+        let page = Extent { from: 0.0, to: 100.0 };
         assert_eq!(
-            labels(Scale::linear((41.83, 42.21), page), 4),
+            labels(Scale::linear(Range::new(0.0, 20.0), page), 5),
+            ["0", "5", "10", "15", "20"]
+        );
+        assert_eq!(
+            labels(Scale::linear(Range::new(41.83, 42.21), page), 4),
             ["41.9", "42.0", "42.1", "42.2"]
         );
-        assert_eq!(labels(Scale::linear((-0.5, 0.5), page), 2), ["-0.5", "0.0", "0.5"]);
-        assert_eq!(labels(Scale::log((0.3, 6.0), page), 5), ["0.5", "1", "2", "5"]);
-        assert_eq!(labels(Scale::log((0.9, 3.1), page), 5), ["1", "1.5", "2", "3"]);
+        assert_eq!(labels(Scale::linear(Range::new(-0.5, 0.5), page), 2), ["-0.5", "0.0", "0.5"]);
+        assert_eq!(labels(Scale::log(Range::new(0.3, 6.0), page), 5), ["0.5", "1", "2", "5"]);
+        assert_eq!(labels(Scale::log(Range::new(0.9, 3.1), page), 5), ["1", "1.5", "2", "3"]);
     }
 
     #[test]
     fn a_range_without_extent_still_has_an_axis() {
-        let scale = Scale::linear((42.0, 42.0), (0.0, 100.0));
+        let scale = Scale::linear(Range::new(42.0, 42.0), Extent { from: 0.0, to: 100.0 });
         assert!((scale.place(42.0) - 50.0).abs() < 1e-9);
         assert!(!scale.ticks(5).is_empty());
-        assert!(!Scale::log((0.0, 0.0), (0.0, 1.0)).place(0.0).is_nan());
+        assert!(
+            !Scale::log(Range::new(0.0, 0.0), Extent { from: 0.0, to: 1.0 }).place(0.0).is_nan()
+        );
     }
 
     #[test]
     fn values_have_their_place() {
-        let scale = Scale::linear((0.0, 10.0), (200.0, 100.0));
+        let scale = Scale::linear(Range::new(0.0, 10.0), Extent { from: 200.0, to: 100.0 });
         assert!((scale.place(2.5) - 175.0).abs() < 1e-9);
-        let log = Scale::log((1.0, 100.0), (0.0, 100.0));
+        let log = Scale::log(Range::new(1.0, 100.0), Extent { from: 0.0, to: 100.0 });
         assert!((log.place(10.0) - 50.0).abs() < 1e-9);
     }
 }

@@ -2,7 +2,8 @@
 
 use maud::{Markup, html};
 
-use super::axis::Scale;
+use super::axis::{Extent, Scale};
+use super::range::Range;
 
 /// An x axis that several plots share.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,15 +11,15 @@ pub struct XAxis {
     /// What runs along it, with its unit.
     pub title: String,
     /// Smallest and largest value, before the division.
-    pub range: (f64, f64),
+    pub range: Range,
     /// Values are divided by this for the ticks.
     pub divisor: f64,
 }
 
 impl XAxis {
     /// Time \[s\], in minutes or hours where it is long.
-    pub fn time(range: (f64, f64)) -> Self {
-        let (unit, divisor) = match range.1 - range.0 {
+    pub fn time(range: Range) -> Self {
+        let (unit, divisor) = match range.length() {
             long if long > 7200.0 => ("h", 3600.0),
             long if long > 600.0 => ("min", 60.0),
             _ => ("s", 1.0),
@@ -27,20 +28,19 @@ impl XAxis {
     }
 
     /// Frames by their number.
-    pub fn frames(range: (f64, f64)) -> Self {
+    pub fn frames(range: Range) -> Self {
         Self { title: "frame".to_string(), range, divisor: 1.0 }
     }
 
     /// Path length \[mm\], in metres where it is long.
-    pub fn path(range: (f64, f64)) -> Self {
-        let (unit, divisor) =
-            if range.1 - range.0 > 10_000.0 { ("m", 1000.0) } else { ("mm", 1.0) };
+    pub fn path(range: Range) -> Self {
+        let (unit, divisor) = if range.length() > 10_000.0 { ("m", 1000.0) } else { ("mm", 1.0) };
         Self { title: format!("distance along the path [{unit}]"), range, divisor }
     }
 
-    fn scale(&self, page: (f64, f64)) -> Scale {
-        let (low, high) = self.range;
-        Scale::linear((low / self.divisor, high / self.divisor), page)
+    fn scale(&self, page: Extent) -> Scale {
+        let Range { min, max } = self.range;
+        Scale::linear(Range::new(min / self.divisor, max / self.divisor), page)
     }
 }
 
@@ -73,13 +73,13 @@ impl Area {
     }
 
     /// Left and right end of the grid.
-    pub fn across(&self) -> (f64, f64) {
-        (LEFT, self.width - RIGHT)
+    pub fn across(&self) -> Extent {
+        Extent { from: LEFT, to: self.width - RIGHT }
     }
 
     /// Lower and upper end of the grid, in the order of a y axis.
-    pub fn upwards(&self) -> (f64, f64) {
-        (self.height - self.bottom, self.top)
+    pub fn upwards(&self) -> Extent {
+        Extent { from: self.height - self.bottom, to: self.top }
     }
 
     /// The x axis on this area.
@@ -101,8 +101,8 @@ impl Area {
 
     /// The same for ticks of another scale.
     pub fn vertical_grid(&self, ticks: &[(f64, String)], scale: &Scale, title: &str) -> Markup {
-        let (bottom, top) = self.upwards();
-        let (left, right) = self.across();
+        let Extent { from: bottom, to: top } = self.upwards();
+        let Extent { from: left, to: right } = self.across();
         html! {
             @for (value, label) in ticks {
                 @let x = round(scale.place(*value));
@@ -116,8 +116,8 @@ impl Area {
 
     /// Horizontal grid lines, their labels and the axis title above them.
     pub fn y_grid(&self, scale: &Scale, title: &str) -> Markup {
-        let (left, right) = self.across();
-        let (bottom, top) = self.upwards();
+        let Extent { from: left, to: right } = self.across();
+        let Extent { from: bottom, to: top } = self.upwards();
         let wanted = if bottom - top > 150.0 { 6 } else { 4 };
         html! {
             @for (value, label) in scale.ticks(wanted) {
@@ -140,8 +140,8 @@ impl Area {
 
     /// Draws only what lies within the grid.
     pub fn clipped(&self, inner: &Markup) -> Markup {
-        let (left, right) = self.across();
-        let (bottom, top) = self.upwards();
+        let Extent { from: left, to: right } = self.across();
+        let Extent { from: bottom, to: top } = self.upwards();
         let (width, height) = (right - left, bottom - top);
         html! {
             svg x=(left) y=(top) width=(width) height=(height)

@@ -1,7 +1,7 @@
 //! What a reason for refusing a frame means, and what to do about it.
 
 /// Meaning and remedy of a status in `widths.csv`.
-pub fn on(status: &str) -> (&'static str, &'static str) {
+pub fn of(status: &str) -> (&'static str, &'static str) {
     match status {
         "no_pair" => (
             "On too few lines across the gauge were two edges found that belong together.",
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn every_reason_is_explained() {
-        let unknown = on("something else");
+        let unknown = of("something else");
         for reject in [
             Reject::NoPair { got: 0.0, need: 0.5 },
             Reject::LowContrast { got: 0.0, need: 6.0 },
@@ -92,7 +92,7 @@ mod tests {
             Reject::OffSurface,
             Reject::Unreadable,
         ] {
-            assert_ne!(on(reject.status()), unknown, "{}", reject.status());
+            assert_ne!(of(reject.status()), unknown, "{}", reject.status());
         }
     }
 }

@@ -5,8 +5,9 @@ use std::fmt::Write as _;
 use maud::{Markup, html};
 
 use super::area::{Area, XAxis, round};
-use super::axis::{Scale, with_margin};
+use super::axis::{Extent, Scale};
 use super::palette::Ink;
+use super::range::Range;
 use super::series::{Point, Series, unbroken};
 
 /// What is drawn into a plot.
@@ -36,18 +37,17 @@ pub struct Plot<'a> {
     /// What runs upwards, with its unit.
     pub y_title: &'a str,
     /// Smallest and largest value; see [`y_range`].
-    pub y_range: (f64, f64),
+    pub y_range: Range,
     /// What is drawn, the lowest first.
     pub layers: Vec<Layer<'a>>,
 }
 
 /// The range that shows all of these series and values, with a little air.
-pub fn y_range(series: &[&Series], values: &[f64]) -> (f64, f64) {
+pub fn y_range(series: &[&Series], values: &[f64]) -> Range {
     let ranges = series.iter().filter_map(|series| series.range());
-    let all = ranges
-        .chain(values.iter().map(|value| (*value, *value)))
-        .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-    with_margin(all.unwrap_or((0.0, 1.0)), 0.06)
+    let all =
+        ranges.chain(values.iter().map(|value| Range::new(*value, *value))).reduce(Range::joined);
+    all.unwrap_or(Range::new(0.0, 1.0)).with_margin(0.06)
 }
 
 impl Plot<'_> {
@@ -81,7 +81,7 @@ impl Plot<'_> {
                 html! { path.band d=(outline(&low, &high, place)) fill=(ink.css()) {} }
             }
             Layer::Level(value, ink, _) => {
-                let (left, right) = self.area.across();
+                let Extent { from: left, to: right } = self.area.across();
                 let at = round(y.place(*value));
                 html! { line.level x1=(left) x2=(right) y1=(at) y2=(at) stroke=(ink.css()) {} }
             }
@@ -92,7 +92,7 @@ impl Plot<'_> {
         let Layer::Level(value, _, text) = layer else { return html! {} };
         let at = round(y.place(*value)) - 4.0;
         html! {
-            text.label x=(self.area.across().1 - 4.0) y=(at) text-anchor="end" {
+            text.label x=(self.area.across().to - 4.0) y=(at) text-anchor="end" {
                 (text)
             }
         }
@@ -163,30 +163,23 @@ fn append(path: &mut String, command: char, (x, y): Point) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::run::palette;
-
-    fn series(points: &[Point]) -> Series {
-        let mut series = Series::default();
-        for point in points {
-            series.push(point.0, point.1);
-        }
-        series
-    }
+    use crate::report::chart::palette;
 
     #[test]
     fn a_curve_runs_through_its_samples() {
-        let axis = XAxis::time((0.0, 10.0));
+        let axis = XAxis::time(Range::new(0.0, 10.0));
         let area = Area::wide(200.0);
-        let samples = series(&[(0.0, 0.0), (10.0, 1.0)]);
+        let samples: Series = [(0.0, 0.0), (10.0, 1.0)].into_iter().collect();
         let plot = Plot {
             area,
             x: &axis,
             y_title: "y [mm]",
-            y_range: (0.0, 1.0),
+            y_range: Range::new(0.0, 1.0),
             layers: vec![Layer::Curve(&samples, palette::WIDTH)],
         };
         let drawn = plot.draw().into_string();
-        let ((left, right), (bottom, top)) = (area.across(), area.upwards());
+        let Extent { from: left, to: right } = area.across();
+        let Extent { from: bottom, to: top } = area.upwards();
         assert!(drawn.contains(&format!("M{left} {bottom}L{right} {top}")), "{drawn}");
         assert!(drawn.contains("time [s]") && drawn.contains("y [mm]"));
     }
@@ -199,7 +192,7 @@ mod tests {
 
     #[test]
     fn nothing_is_drawn_of_nothing() {
-        let (empty, axis) = (Series::default(), XAxis::path((0.0, 0.0)));
+        let (empty, axis) = (Series::default(), XAxis::path(Range::new(0.0, 0.0)));
         let plot = Plot {
             area: Area::half(150.0),
             x: &axis,

@@ -46,7 +46,7 @@ pub fn has_marks(strip: &Strip) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::run::strip::Mark;
+    use crate::report::chart::strip::Mark;
 
     #[test]
     fn what_is_not_drawn_is_not_named() {

@@ -3,6 +3,7 @@
 use maud::{Markup, html};
 
 use super::area::{Area, LEFT, XAxis, round};
+use super::axis::Extent;
 use super::palette::Ink;
 use super::strip::{Spell, Strip};
 use crate::rows::names::spoken;
@@ -40,7 +41,7 @@ pub fn draw(axis: &XAxis, rows: &[Row<'_>]) -> Markup {
 }
 
 fn draw_row(area: &Area, axis: &XAxis, row: &Row<'_>, y: f64) -> Markup {
-    let (left, right) = area.across();
+    let Extent { from: left, to: right } = area.across();
     html! {
         text.title x=(LEFT - 8.0) y=(y + 14.5) text-anchor="end" { (row.name) }
         rect.lane x=(left) y=(y) width=(right - left) height=(ROW) rx="2" {}
@@ -56,7 +57,7 @@ fn draw_spell(area: &Area, axis: &XAxis, spell: &Spell, ink: Ink, y: f64) -> Mar
     let width = round((to - from).max(LEAST));
     let name = spoken(spell.mark.name);
     let letters = name.chars().fold(2.0, |sum, _| sum + 1.0);
-    let decimals = usize::from(axis.divisor > 1.0 || axis.range.1 - axis.range.0 < 600.0);
+    let decimals = usize::from(axis.divisor > 1.0 || axis.range.length() < 600.0);
     html! {
         rect x=(from) y=(y) width=(width) height=(ROW) fill=(ink.css()) {
             title {

@@ -3,8 +3,9 @@
 use maud::{Markup, html};
 
 use super::area::{Area, round};
-use super::axis::Scale;
+use super::axis::{Extent, Scale};
 use super::palette;
+use super::range::Range;
 use crate::numeric::statistics::{Distribution, as_f64};
 
 const BARS_PER_OCTAVE: usize = 8;
@@ -14,10 +15,10 @@ pub fn draw(latencies: &Distribution) -> Markup {
     let bars = latencies.bars(BARS_PER_OCTAVE);
     let (Some(first), Some(last)) = (bars.first(), bars.last()) else { return html! {} };
     let area = Area::wide(230.0);
-    let x = Scale::log((first.0.min(last.1 / 4.0), last.1), area.across());
+    let x = Scale::log(Range::new(first.0.min(last.1 / 4.0), last.1), area.across());
     let most = bars.iter().map(|bar| bar.2).max().unwrap_or(1);
-    let y = Scale::linear((0.0, as_f64(most) * 1.12), area.upwards());
-    let (bottom, top) = area.upwards();
+    let y = Scale::linear(Range::new(0.0, as_f64(most) * 1.12), area.upwards());
+    let Extent { from: bottom, to: top } = area.upwards();
     let inner = html! {
         (area.y_grid(&y, "setpoints"))
         (area.vertical_grid(&x.ticks(0), &x, "latency [ms]"))
