@@ -7,48 +7,41 @@
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "help texts give units in brackets")]
 
-/// Writes a line to standard output. One that nobody reads any more is no reason to
-/// end: a run goes on when the pipe behind it is closed.
-macro_rules! say {
-    () => { say!("") };
-    ($($text:tt)*) => {{
-        use std::io::Write;
-        _ = writeln!(std::io::stdout(), $($text)*);
-    }};
-}
+#[macro_use]
+mod print;
 
-/// Writes a line to standard error. Where nobody can be told, the work still goes on.
-macro_rules! tell {
-    ($($text:tt)*) => {{
-        use std::io::Write;
-        _ = writeln!(std::io::stderr(), $($text)*);
-    }};
-}
-
-pub mod accuracy;
-pub mod board;
-pub mod calibrate;
-pub mod check;
-pub mod compare;
-pub mod convert;
-pub mod demo;
-pub mod excite;
-pub mod extruder_sim;
-pub mod identify;
-pub mod models;
-pub mod offset;
-pub mod outcome;
-pub mod plan;
-pub mod process;
-pub mod recorded;
-pub mod render;
-pub mod replay;
-pub mod reproduce;
-pub mod robot_sim;
-pub mod run;
-pub mod simulate;
-pub mod tune;
-pub mod verify;
+mod accuracy;
+mod arguments;
+mod bed_plane;
+mod board;
+mod board_arguments;
+mod board_image;
+mod calibrate;
+mod camera_offset;
+mod check;
+mod compare;
+mod convert;
+mod demo;
+mod excite;
+mod extruder_sim;
+mod identify;
+mod live_cell;
+mod models;
+mod offset;
+mod outcome;
+mod plan;
+mod process;
+mod recorded;
+mod render;
+mod replay;
+mod reproduce;
+mod robot_sim;
+mod run;
+mod simulate;
+mod simulated_cell;
+mod status;
+mod tune;
+mod verify;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -56,15 +49,8 @@ use std::process::ExitCode;
 use clap::{ArgAction, Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-use crate::assembly::{AssemblyError, LoadedCell};
-use crate::document::Problems;
-use crate::io::calibration_file::CalibrationFileError;
-use crate::io::model_file::ModelFileError;
-use crate::sim::cell::Rig;
-
-/// Status of a command that finished, but with too many frames refused or
-/// records lost.
-pub const WITH_LOSS: u8 = 3;
+use print::Voice;
+use status::status_of;
 
 /// Keeps an extruded bead at the width that was asked for.
 ///
@@ -110,26 +96,6 @@ enum Command {
     Tune(tune::TuneArgs),
 }
 
-/// How much a command says on standard error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Voice {
-    /// Nothing but errors.
-    pub quiet: bool,
-}
-
-/// Arguments that cannot be followed; ends with exit status 2.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct WrongArguments(String);
-
-impl WrongArguments {
-    /// With what was found and what was expected.
-    #[expect(clippy::needless_pass_by_value, reason = "an error or a new text at every call")]
-    pub fn new(what: impl ToString) -> Self {
-        Self(what.to_string())
-    }
-}
-
 /// Runs the program.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -163,34 +129,6 @@ pub fn main() -> ExitCode {
         tell!("error: {error:#}");
         status_of(&error)
     })
-}
-
-/// The extruder side of a simulated cell, with what is to be said about it.
-fn simulated_extruder(loaded: &LoadedCell) -> anyhow::Result<Option<Rig>> {
-    let side = loaded.simulated_extruder()?;
-    if let Some(side) = &side {
-        warn(&side.warnings);
-    }
-    Ok(side.map(|side| side.rig))
-}
-
-/// Prints warnings about a cell; nothing of them keeps it from running.
-fn warn(warnings: &[String]) {
-    for warning in warnings {
-        tell!("warning: {warning}");
-    }
-}
-
-/// Configuration and arguments are told from failures at work.
-fn status_of(error: &anyhow::Error) -> ExitCode {
-    let wrong = error.chain().any(|cause| {
-        cause.is::<WrongArguments>()
-            || cause.is::<Problems>()
-            || cause.is::<CalibrationFileError>()
-            || cause.is::<ModelFileError>()
-            || cause.downcast_ref().is_some_and(AssemblyError::is_in_file)
-    });
-    ExitCode::from(if wrong { 2 } else { 1 })
 }
 
 /// Sends the library's words to standard error.

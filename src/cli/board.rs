@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::WrongArguments;
-use super::calibrate::BoardArgs;
+use super::arguments::WrongArguments;
+use super::board_arguments::BoardArgs;
 use crate::io::whole_file::write_whole;
 use crate::report::sheet::{Paper, Sheet};
 

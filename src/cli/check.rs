@@ -8,8 +8,9 @@ use std::process::ExitCode;
 use clap::Args;
 use nalgebra::Point3;
 
-use super::WrongArguments;
-use super::calibrate::check_writable;
+use super::arguments::WrongArguments;
+use super::arguments::check_writable;
+use super::print::warn;
 use crate::assembly::{ExtruderSide, LoadedCell, beyond, steady};
 use crate::calibration::Calibration;
 use crate::cell::Cell;
@@ -59,7 +60,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     // sound.
     let side = run.as_ref().map_or(Ok(None), LoadedCell::extruder)?;
     if let Some(side) = &side {
-        super::warn(&side.warnings);
+        warn(&side.warnings);
     }
     run.as_ref().map_or(Ok(()), LoadedCell::check_sight)?;
     check_gauge(&loaded)?;

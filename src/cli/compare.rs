@@ -6,7 +6,8 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::Args;
 
-use super::{Voice, WrongArguments};
+use super::arguments::WrongArguments;
+use super::print::Voice;
 use crate::assembly::LoadedCell;
 use crate::cell::file::{Purpose, RunPart};
 use crate::core::units::Mm;

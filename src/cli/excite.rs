@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
-use super::WrongArguments;
-use super::outcome::refuse_replacing;
+use super::arguments::WrongArguments;
+use super::arguments::refuse_replacing;
 use crate::core::quantity::{Quantity, Unit};
 use crate::identify::excitation::{Excitation, Shape};
 use crate::identify::number::short;

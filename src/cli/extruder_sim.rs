@@ -9,7 +9,7 @@ use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
-use super::WrongArguments;
+use super::arguments::WrongArguments;
 use crate::assembly::LoadedCell;
 use crate::cell::file::{ExtruderPart, Purpose};
 use crate::core::time::{Span, Stamp};

@@ -18,7 +18,7 @@ use clap::Args;
 
 use self::bead::Bead;
 use self::options::{Columns, parse_dead_time, parse_forms, parse_hampel, parse_smooth};
-use super::outcome::free_folder;
+use super::arguments::free_folder;
 use crate::identify::file::{Setting, to_toml};
 use crate::identify::fit::{DeadTime, Structure};
 use crate::numeric::hampel::Hampel;

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::Args;
 
-use super::WrongArguments;
+use super::arguments::WrongArguments;
 use crate::core::quantity::Unit;
 use crate::identify::file::ModelFile;
 use crate::identify::library::{Entry, Library, TOLERANCE_C, Wanted};

@@ -9,7 +9,9 @@ use anyhow::Context;
 use clap::Args;
 use crossbeam_channel::{Sender, bounded};
 
-use super::{Voice, WITH_LOSS, WrongArguments};
+use super::arguments::WrongArguments;
+use super::print::Voice;
+use super::status::WITH_LOSS;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::drivers::camera::mcap::RobotZ;

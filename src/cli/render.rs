@@ -10,7 +10,8 @@ use clap::Args;
 use image::{ExtendedColorType, ImageEncoder, codecs::png};
 use rayon::prelude::*;
 
-use super::{Voice, WrongArguments};
+use super::arguments::WrongArguments;
+use super::print::Voice;
 use crate::assembly::LoadedCell;
 use crate::cell::Cell;
 use crate::cell::file::{CalibrationSource, Purpose};

@@ -7,7 +7,7 @@ use anyhow::Context;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 
-use super::Voice;
+use super::print::Voice;
 use crate::io::progress::Progress;
 use crate::rows::output;
 use crate::studies::reproduce::summary::Summary;

@@ -7,7 +7,7 @@ use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
-use super::WrongArguments;
+use super::arguments::WrongArguments;
 use crate::core::time::{Span, Stamp};
 use crate::core::units::{Mm, MmPerS, MmPerS2, NotFinite};
 use crate::io::clock::RunClock;

@@ -6,8 +6,10 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::Args;
 
-use super::WrongArguments;
-use super::calibrate::{BoardArgs, check_size, look_at, parse_length};
+use super::arguments::WrongArguments;
+use super::arguments::parse_length;
+use super::board_arguments::BoardArgs;
+use super::board_image::{check_size, look_at};
 use crate::calibration::Calibration;
 use crate::calibration::verify::{Findings, verify};
 use crate::core::units::Mm;

@@ -10,9 +10,10 @@ use anyhow::{Context, Result};
 use image::{GrayImage, ImageFormat};
 use rayon::prelude::*;
 
-use super::AccuracyArgs;
+use super::arguments::AccuracyArgs;
 use crate::calibration::SurfaceMap;
-use crate::cli::{Voice, WrongArguments};
+use crate::cli::arguments::WrongArguments;
+use crate::cli::print::Voice;
 use crate::core::frame::Pixels;
 use crate::io::progress::Progress;
 use crate::rows::output;

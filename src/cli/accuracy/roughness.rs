@@ -6,9 +6,9 @@ use std::sync::{Mutex, PoisonError};
 use anyhow::{Context, Result};
 use rayon::prelude::*;
 
-use super::AccuracyArgs;
+use super::arguments::AccuracyArgs;
 use crate::calibration::SurfaceMap;
-use crate::cli::Voice;
+use crate::cli::print::Voice;
 use crate::core::units::Mm;
 use crate::io::progress::Progress;
 use crate::rows::output;

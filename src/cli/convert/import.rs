@@ -2,13 +2,15 @@
 
 use anyhow::Context;
 
-use super::{ConvertArgs, WrongArguments};
-use crate::calibration::board::Board;
+use super::arguments::ConvertArgs;
+use crate::calibration::board::{Board, Marks};
 use crate::calibration::equations::Model;
 use crate::calibration::exchange::{Import, Intrinsics};
 use crate::calibration::{Quality, file};
-use crate::cli::calibrate::plane::{Boards, Plane, looked_for};
-use crate::cli::calibrate::{board_of, report, say};
+use crate::cli::arguments::WrongArguments;
+use crate::cli::bed_plane::{Boards, Plane, looked_for};
+use crate::cli::board_arguments::{InnerCorners, board_of};
+use crate::cli::print::print;
 use crate::core::units::Mm;
 
 /// Corners on the bed may be so far off \[px\]; beyond that the pictures do not belong
@@ -23,12 +25,13 @@ pub fn text(
     import: &Import,
     notes: &mut Vec<String>,
 ) -> anyhow::Result<String> {
-    let (Some((columns, rows)), Some(square)) = (args.board, args.square_mm) else {
+    let (Some(corners), Some(square)) = (args.board, args.square_mm) else {
         return Err(WrongArguments::new("--plane needs --board and --square-mm").into());
     };
-    let board = board_of((columns, rows), square, (args.marker_mm, args.dictionary))?;
+    let marks = args.marker_mm.map(|side| Marks { side, dictionary: args.dictionary });
+    let board = board_of(corners, square, marks)?;
     let plane = bed_plane(args, &board, &import.intrinsics)?;
-    say(&report::plane(&plane));
+    print(&plane.text());
     let Intrinsics { image_size_px, camera, .. } = &import.intrinsics;
     if let Some(px) = camera.fold(*image_size_px) {
         notes.push(format!(
@@ -58,6 +61,7 @@ pub fn text(
          with pictures of a board tells it",
         args.input.display()
     ));
+    let InnerCorners { columns, rows } = corners;
     let from = format!(
         "Camera and lens from {} ({}).\n\
          Bed plane: {} below the face of a board with {columns}x{rows} inner corners and squares \

@@ -5,7 +5,7 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 
 use super::data::Rows;
-use crate::cli::WrongArguments;
+use crate::cli::arguments::WrongArguments;
 use crate::core::quantity::Unit;
 use crate::core::units::Mm;
 use crate::extruder::demand::section;

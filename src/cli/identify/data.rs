@@ -7,7 +7,7 @@ use anyhow::{Context, Result, anyhow};
 use super::bead::Bead;
 use super::options::Columns;
 use super::source::Source;
-use crate::cli::WrongArguments;
+use crate::cli::arguments::WrongArguments;
 use crate::core::quantity::Unit;
 use crate::identify::experiment::{Experiment, ExperimentError, Rules, doubt_unit};
 use crate::identify::series::paired;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 
-use crate::cli::WrongArguments;
+use crate::cli::arguments::WrongArguments;
 use crate::rows::output::{make_folder, write_whole};
 use crate::sim::logged;
 use crate::sim::start_stop::{Machine, example as plan, record, to_csv};

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow};
 
-use crate::cli::WrongArguments;
-use crate::cli::outcome::refuse_replacing;
+use crate::cli::arguments::WrongArguments;
+use crate::cli::arguments::refuse_replacing;
 use crate::identify::file::parse;
 use crate::identify::library::file_name;
 use crate::io::model_file::read_library;

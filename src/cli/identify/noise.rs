@@ -9,7 +9,7 @@ use super::bead::Bead;
 use super::data::Rows;
 use super::options::Columns;
 use super::source::Source;
-use crate::cli::WrongArguments;
+use crate::cli::arguments::WrongArguments;
 use crate::core::quantity::Unit;
 use crate::core::units::MPa;
 use crate::extruder::pressure::kalman::Noise;

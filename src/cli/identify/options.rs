@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::{Forms, Wanted};
-use crate::cli::WrongArguments;
+use crate::cli::arguments::WrongArguments;
 use crate::core::quantity::{Quantity, Unit};
 use crate::identify::fit::{DeadTime, MOST_POLES, Structure};
 use crate::identify::series::Series;

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 
 use super::bead::LAID_FLOW;
 use super::{DEAD_TIME_S, DEAD_TIME_SHARE, IdentifyArgs, VALIDATE_SHARE, data};
-use crate::cli::WrongArguments;
+use crate::cli::arguments::WrongArguments;
 use crate::core::quantity::Quantity;
 use crate::identify::experiment::Experiment;
 use crate::identify::file::Setting;

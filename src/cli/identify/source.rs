@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use super::bead::Bead;
 use crate::cell::Cell;
 use crate::cell::file::Purpose;
-use crate::cli::WrongArguments;
+use crate::cli::arguments::WrongArguments;
 use crate::core::units::Mm;
 use crate::identify::table::Table;
 use crate::io::recorded::{Facts, Recorded, columns};

@@ -3,12 +3,13 @@
 use anyhow::{Context, bail};
 use nalgebra::Vector2;
 
-use super::super::WrongArguments;
-use super::super::calibrate::{check_size, look_at};
-use super::{OffsetArgs, tell};
+use super::answer::tell;
+use super::arguments::OffsetArgs;
 use crate::assembly::LoadedCell;
 use crate::calibration::offset::{Found, Gauge, OffsetError, Touch, find};
 use crate::cell::file::{Mount, Purpose};
+use crate::cli::arguments::WrongArguments;
+use crate::cli::board_image::{check_size, look_at};
 use crate::core::units::Mm;
 use crate::sim::view::gauge_middle;
 use crate::vision::Axis;
