@@ -10,43 +10,37 @@
 #[macro_use]
 mod print;
 
-mod accuracy;
 mod arguments;
 mod bed_plane;
-mod board;
 mod board_arguments;
 mod board_image;
 mod calibrate;
+mod camera;
 mod camera_offset;
 mod check;
 mod compare;
-mod convert;
 mod demo;
-mod excite;
-mod extruder_sim;
-mod identify;
+mod extruder;
+mod help;
+mod lab;
 mod live_cell;
-mod models;
-mod offset;
+mod old_names;
 mod outcome;
 mod plan;
 mod process;
 mod recorded;
-mod render;
 mod replay;
-mod reproduce;
-mod robot_sim;
 mod run;
+mod sim;
 mod simulate;
 mod simulated_cell;
 mod status;
 mod tune;
-mod verify;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
-use clap::{ArgAction, Parser, Subcommand};
+use clap::{ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
 use print::Voice;
@@ -70,60 +64,79 @@ pub struct Cli {
     command: Command,
 }
 
+/// In the order of their help: what is used daily, then the groups.
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::DemoArgs),
+    Check(check::CheckArgs),
     Run(run::RunArgs),
     Process(process::ProcessArgs),
     Calibrate(calibrate::CalibrateArgs),
-    Board(board::SheetArgs),
-    Verify(verify::VerifyArgs),
-    Convert(convert::ConvertArgs),
+    Tune(tune::TuneArgs),
+    Plan(plan::PlanArgs),
     Simulate(simulate::SimulateArgs),
     Compare(compare::CompareArgs),
-    Render(render::RenderArgs),
-    RobotSim(robot_sim::RobotSimArgs),
-    ExtruderSim(extruder_sim::ExtruderSimArgs),
     Replay(replay::ReplayArgs),
-    Reproduce(reproduce::ReproduceArgs),
-    Accuracy(accuracy::AccuracyArgs),
-    Check(check::CheckArgs),
-    Offset(offset::OffsetArgs),
-    Excite(excite::ExciteArgs),
-    Identify(Box<identify::IdentifyArgs>),
-    Models(models::ModelsArgs),
-    Plan(plan::PlanArgs),
-    Tune(tune::TuneArgs),
+    #[command(
+        subcommand,
+        after_help = "\
+Example:
+  truebead camera board --board 9x6 --square-mm 20 --out board.pdf"
+    )]
+    Camera(camera::CameraCommand),
+    #[command(
+        subcommand,
+        after_help = "\
+Example:
+  truebead extruder columns log.csv"
+    )]
+    Extruder(extruder::ExtruderCommand),
+    #[command(
+        subcommand,
+        after_help = "\
+Example:
+  truebead sim robot --endless"
+    )]
+    Sim(sim::SimCommand),
+    #[command(
+        subcommand,
+        after_help = "\
+Example:
+  truebead lab reproduce barjuei2022 --out barjuei2022"
+    )]
+    Lab(lab::LabCommand),
 }
 
 /// Runs the program.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let matches = help::with_groups(Cli::command()).try_get_matches();
+    let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
+        Ok(cli) => cli,
+        Err(error) => match old_names::refusal(&error) {
+            Some(refusal) => {
+                tell!("error: {refusal}");
+                return ExitCode::from(2);
+            }
+            None => error.exit(),
+        },
+    };
     listen(&cli);
     let voice = Voice { quiet: cli.quiet };
     let done = match &cli.command {
         Command::Demo(args) => demo::run(args, voice),
+        Command::Check(args) => check::run(args),
         Command::Run(args) => run::run(args, voice),
         Command::Process(args) => process::run(args, voice),
-        Command::Board(args) => board::run(args).map(|()| ExitCode::SUCCESS),
-        Command::Verify(args) => verify::run(args),
-        Command::Convert(args) => convert::run(args, voice).map(|()| ExitCode::SUCCESS),
         Command::Calibrate(args) => calibrate::run(args),
-        Command::Simulate(args) => simulate::run(args, voice),
-        Command::Compare(args) => compare::run(args, voice),
-        Command::Render(args) => render::run(args, voice).map(|()| ExitCode::SUCCESS),
-        Command::RobotSim(args) => robot_sim::run(args).map(|()| ExitCode::SUCCESS),
-        Command::ExtruderSim(args) => extruder_sim::run(args).map(|()| ExitCode::SUCCESS),
-        Command::Reproduce(args) => reproduce::run(args, voice),
-        Command::Replay(args) => replay::run(args),
-        Command::Accuracy(args) => accuracy::run(args, voice),
-        Command::Check(args) => check::run(args),
-        Command::Offset(args) => offset::run(args),
-        Command::Excite(args) => excite::run(args).map(|()| ExitCode::SUCCESS),
-        Command::Identify(args) => identify::run(args).map(|()| ExitCode::SUCCESS),
-        Command::Models(args) => models::run(args),
         Command::Tune(args) => tune::run(args, voice),
         Command::Plan(args) => plan::run(args).map(|()| ExitCode::SUCCESS),
+        Command::Simulate(args) => simulate::run(args, voice),
+        Command::Compare(args) => compare::run(args, voice),
+        Command::Replay(args) => replay::run(args),
+        Command::Camera(command) => camera::run(command, voice),
+        Command::Extruder(command) => extruder::run(command),
+        Command::Sim(command) => sim::run(command),
+        Command::Lab(command) => lab::run(command, voice),
     };
     done.unwrap_or_else(|error| {
         tell!("error: {error:#}");

@@ -27,7 +27,7 @@ const UNLIKELY_NEAR: Mm = Mm::constant(0.5);
 
 /// Validates a cell file and all it refers to.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(after_help = "\
 Example:
   truebead check cells/barjuei2022.toml
 

@@ -21,7 +21,7 @@ const MOST: usize = 6;
 
 /// Lays the same simulated bead with several controllers and tells how well each does it.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(after_help = "\
 Example:
   truebead compare cells/barjuei2022.toml cells/distance.toml --widths 44,42,40,38 --out compared
 

@@ -28,7 +28,7 @@ const SHIPPED_ADDRESS: &str = "127.0.0.1:5653";
 /// Frames of a simulated bead are rendered and measured, a simulated robot
 /// behind a real TCP socket is controlled, and everything is recorded.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(after_help = "\
 Example:
   truebead demo --out demo --seconds 20
 

@@ -36,7 +36,7 @@ const NAMED: u64 = 10;
 
 /// Measures the bead in recorded frames.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(after_help = "\
 Examples:
   truebead process frames/ --cell cell.toml --out measured/
   truebead process clip.mp4 --cell cell.toml --out measured/

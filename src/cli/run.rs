@@ -14,7 +14,7 @@ use crate::io::clock::RunClock;
 
 /// Runs the live cell: measures, controls the robot's speed, records.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(after_help = "\
 Example:
   truebead check cell.toml
   truebead run cell.toml --out runs/monday

@@ -31,7 +31,7 @@ use crate::width_control::target::Target;
 
 /// Runs the closed loop on a simulated cell.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(after_help = "\
 Example:
   truebead simulate cells/barjuei2022.toml --out layer
 

@@ -10,7 +10,7 @@ use crate::core::units::Mm;
 
 /// Finds camera, lens and bed plane from images of a board, in a folder or taken now.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(after_help = "\
 Example:
   truebead calibrate pictures/ --board 9x6 --square-mm 20 --out calib.toml
 

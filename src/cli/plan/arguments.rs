@@ -13,7 +13,7 @@ use crate::plan::gcode;
 /// follows its command within a second or so. A plan lets both go slower together,
 /// in time.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(after_help = "\
 Examples:
   truebead plan jobs/corner.gcode --cell cells/extruder-feedforward.toml --out plan
   truebead plan jobs/corner.csv --cell cells/extruder-feedforward.toml --out plan --budget-s 0.3

@@ -10,7 +10,7 @@ use crate::core::units::Mm;
 
 /// Finds what a cell is like from steps of its speed, and proposes settings.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(after_help = "\
 Examples:
   truebead tune my-cell.toml --out tuned --simulated
   truebead tune my-cell.toml --out tuned
