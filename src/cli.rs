@@ -55,10 +55,10 @@ use status::status_of;
 #[command(name = "truebead", version, propagate_version = true, max_term_width = 100)]
 pub struct Cli {
     /// Say more: -v what is being done, -vv every detail
-    #[arg(short, long, action = ArgAction::Count, global = true)]
+    #[arg(short, long, action = ArgAction::Count, global = true, display_order = 900)]
     verbose: u8,
     /// Say nothing but errors
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    #[arg(short, long, global = true, conflicts_with = "verbose", display_order = 901)]
     quiet: bool,
     #[command(subcommand)]
     command: Command,

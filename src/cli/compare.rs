@@ -19,7 +19,7 @@ use crate::sim::compare::{Contender, Figures};
 /// Most controllers: as many as there are colours.
 const MOST: usize = 6;
 
-/// Lays the same simulated bead with several controllers and tells how well each does it.
+/// Lays the same simulated bead with several controllers and compares them.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:

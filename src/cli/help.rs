@@ -8,7 +8,7 @@ use clap::builder::styling::Styles;
 /// Gives the program a help that lists the commands of groups, too.
 pub fn with_groups(command: Command) -> Command {
     let list = list(&command);
-    command.disable_help_subcommand(true).help_template(format!(
+    command.help_template(format!(
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{list}\n{{options}}{{after-help}}"
     ))
 }
@@ -58,4 +58,42 @@ fn names(command: &Command) -> Vec<String> {
 
 fn is_group(command: &Command) -> bool {
     command.has_subcommands()
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+    use crate::cli::Cli;
+
+    /// Most lines of a help.
+    const MAX_LINES: usize = 60;
+
+    fn check(command: &mut Command, path: &str) {
+        let help = command.render_long_help().to_string();
+        let lines = help.lines().count();
+        assert!(lines <= MAX_LINES, "{path}: {lines} lines\n{help}");
+        let is_program = path == "truebead";
+        assert!(is_program || help.contains("Example"), "{path} has no example");
+        for one in command.get_subcommands_mut().filter(|one| one.get_name() != "help") {
+            let path = format!("{path} {}", one.get_name());
+            check(one, &path);
+        }
+    }
+
+    #[test]
+    fn every_help_is_short_and_has_an_example() {
+        let mut command = with_groups(Cli::command());
+        command.build();
+        check(&mut command, "truebead");
+    }
+
+    #[test]
+    fn the_help_lists_daily_commands_first_and_then_the_groups() {
+        let help = with_groups(Cli::command()).render_help().to_string();
+        let names = ["demo", "calibrate", "replay", "camera board", "extruder models"];
+        let at = names.map(|name| help.find(&format!("\n  {name} ")));
+        assert!(at.is_sorted() && at[0].is_some(), "{at:?}\n{help}");
+    }
 }

@@ -34,8 +34,7 @@ it goes.
 Exit status: 0 all steps are the same, 1 a step differs, 2 the file is not a
 recording that can be replayed, 3 events are missing from its middle.";
 
-/// Feeds the recorded events to the controller and compares its steps with the
-/// recorded ones, bit for bit.
+/// Feeds recorded events to the controller and compares its steps bit for bit.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub struct ReplayArgs {

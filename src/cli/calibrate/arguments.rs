@@ -8,7 +8,7 @@ use crate::cli::arguments::parse_length;
 use crate::cli::board_arguments::BoardArgs;
 use crate::core::units::Mm;
 
-/// Finds camera, lens and bed plane from images of a board, in a folder or taken now.
+/// Finds camera, lens and bed plane from images of a board.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:

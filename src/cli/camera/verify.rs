@@ -29,7 +29,7 @@ const HIGHER_MM: f64 = 0.3;
 /// A board that is tilted against the bed by more than this does not lie on it \[°\].
 const FLAT_DEG: f64 = 2.0;
 
-/// Measures a board that lies on the bed, and says whether the calibration still holds.
+/// Measures a board on the bed and says whether the calibration still holds.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:

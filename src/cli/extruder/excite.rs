@@ -48,6 +48,9 @@ enum Kind {
 
 /// A pseudo-random binary sequence of maximal length between two levels
 #[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  truebead extruder excite prbs --low 20 --high 40 --hold-s 0.7 --quantity screw_rpm --out profile.csv")]
 struct PrbsArgs {
     /// Level of a zero
     #[arg(long, allow_hyphen_values = true)]
@@ -65,6 +68,10 @@ struct PrbsArgs {
 
 /// Levels that are drawn at random, normally distributed
 #[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  truebead extruder excite gaussian --low 2 --high 4 --hold-s 1.5 --duration-s 90 \\
+      --quantity drive_v --out profile.csv")]
 struct GaussianArgs {
     /// Smallest level
     #[arg(long, allow_hyphen_values = true)]
@@ -94,6 +101,9 @@ fn parse_level(text: &str) -> Result<f64, String> {
 
 /// Levels that are told, one after the other
 #[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  truebead extruder excite steps --levels 20,40,30,20 --hold-s 15 --quantity screw_rpm --out profile.csv")]
 struct StepsArgs {
     /// The levels, such as 20,40,30
     #[arg(

@@ -24,7 +24,7 @@ use crate::rows::output::{make_folder, write_whole};
 /// Litres a minute in mm³/s.
 const MM3_PER_S_PER_L_PER_MIN: f64 = 1e6 / 60.0;
 
-/// Finds from a table of starts and stops how late the flow comes and what drools after a stop.
+/// Finds from a log the delay of starts and what drools after a stop.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:

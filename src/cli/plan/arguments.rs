@@ -8,10 +8,6 @@ use crate::cli::arguments::WrongArguments;
 use crate::plan::gcode;
 
 /// Plans the robot's speed and the extruder's command together, ahead of a job.
-///
-/// The robot slows down at corners within hundredths of a second, and an extruder
-/// follows its command within a second or so. A plan lets both go slower together,
-/// in time.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -22,6 +18,9 @@ Examples:
 The job is a table (.csv) of path, position and nominal speed, or G-code (.gcode, .nc,
 .g); jobs/README.md has both. The cell's [extruder] needs a strategy with a model,
 \"feedforward\"; its limits and those of [limits] are kept.
+
+A robot slows down at corners within hundredths of a second, and an extruder follows
+its command within a second or so: a plan lets both go slower together, in time.
 
 Leaves plan.csv and report.html.")]
 pub struct PlanArgs {
@@ -52,9 +51,9 @@ pub struct PlanArgs {
     /// [default: 0, which slows every corner to --apex-mm-per-s]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub corner_mm: Option<f64>,
-    /// How beads of G-code begin and end
-    /// [default: rest]
-    #[arg(long, value_name = "HOW")]
+    /// How beads of G-code begin and end: at rest, or moving, for a cell that starts and
+    /// stops them itself [default: rest]
+    #[arg(long, value_name = "rest|moving", hide_possible_values = true)]
     pub ends: Option<Ends>,
     /// Flow that no model tells: its standard deviation as a share of that of the flow's
     /// change; the more, the less the flow is changed

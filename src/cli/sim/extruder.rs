@@ -20,8 +20,7 @@ use crate::simulators::extruder::{ExtruderOptions, ExtruderSim};
 /// Times between two STATE lines that an extruder may have [s].
 const STATE_PERIODS_S: (f64, f64) = (0.005, 0.2);
 
-/// An extruder that answers the extruder link: the `[extruder_plant]` of a cell
-/// in real time, with commands that run out.
+/// An extruder that answers the extruder link.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example, in three terminals:
@@ -29,7 +28,7 @@ Example, in three terminals:
   truebead sim extruder cells/extruder.toml
   truebead run cells/extruder.toml
 
-It takes the commands that [extruder] of the cell allows, and reports as often
+It is the [extruder_plant] of the cell in real time. It takes the commands that [extruder] of the cell allows, and reports as often
 as io_rate_hz says. A second PC replaces the first; a new connection stands for
 the operator's key that acknowledges a fault. The rendered camera of such a run
 shows a bead that follows the robot only, not the flow.

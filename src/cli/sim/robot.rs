@@ -14,8 +14,7 @@ use crate::io::clock::RunClock;
 use crate::link::{Job, RobotParams};
 use crate::simulators::robot::{RobotSim, SimError, SimOptions};
 
-/// A robot that answers the robot link: velocity loop, its own speed limits,
-/// setpoints that run out.
+/// A robot that answers the robot link.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -23,7 +22,7 @@ Examples:
   truebead sim robot --bead-mm 2000 --layers 4 --layer-height-mm 20
   truebead sim robot --listen 0.0.0.0:5653 --endless --bandwidth-hz 3
 
-A bead begins when a PC is connected, after the pause. A second PC replaces the
+It has a velocity loop, speed limits of its own, and setpoints that run out. A bead begins when a PC is connected, after the pause. A second PC replaces the
 first. A new connection stands for the operator's key: it begins the job again
 once it was finished, and acknowledges a STOP or FAULT that it finds.
 

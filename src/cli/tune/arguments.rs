@@ -56,8 +56,14 @@ pub struct TuneArgs {
     /// Write a copy of the cell with the proposed settings
     #[arg(long, value_name = "TUNED.toml")]
     pub write: Option<PathBuf>,
-    /// The law of that copy
-    #[arg(long, value_name = "LAW", default_value = "distance", requires = "write")]
+    /// The law of that copy: distance or pi
+    #[arg(
+        long,
+        value_name = "LAW",
+        default_value = "distance",
+        requires = "write",
+        hide_possible_values = true
+    )]
     pub law: Law,
 }
 

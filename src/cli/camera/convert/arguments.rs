@@ -27,8 +27,9 @@ pub struct ConvertArgs {
     /// File to write
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Whose file to write [default: truebead where --out ends in .toml]
-    #[arg(long, value_name = "FORMAT")]
+    /// Whose file to write: ros, opencv or truebead
+    /// [default: truebead where --out ends in .toml]
+    #[arg(long, value_name = "FORMAT", hide_possible_values = true)]
     pub to: Option<To>,
     /// Name of the camera in ROS's file [default: that of the input, or camera]
     #[arg(long, value_name = "NAME", value_parser = parse_name)]

@@ -8,7 +8,7 @@ use crate::cli::arguments::{WrongArguments, parse_length};
 use crate::cli::board_arguments::BoardArgs;
 use crate::core::units::Mm;
 
-/// Finds how far the nozzle is from the middle of the gauge: `offset_mm` of a cell.
+/// Finds how far the nozzle is from the middle of the gauge: a cell's `offset_mm`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

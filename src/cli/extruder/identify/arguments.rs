@@ -27,7 +27,7 @@ const DEAD_TIME_S: f64 = 10.0;
 /// Share of the data that is kept to validate with.
 const VALIDATE_SHARE: f64 = 0.3;
 
-/// Finds a model of an extruder in logged data, and writes it as a file that a cell uses.
+/// Finds a model of an extruder in logged data, for a cell to use.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
