@@ -7,64 +7,44 @@
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "help texts give units in brackets")]
 
-/// Writes a line to standard output. One that nobody reads any more is no reason to
-/// end: a run goes on when the pipe behind it is closed.
-macro_rules! say {
-    () => { say!("") };
-    ($($text:tt)*) => {{
-        use std::io::Write;
-        _ = writeln!(std::io::stdout(), $($text)*);
-    }};
-}
+#[macro_use]
+mod print;
 
-/// Writes a line to standard error. Where nobody can be told, the work still goes on.
-macro_rules! tell {
-    ($($text:tt)*) => {{
-        use std::io::Write;
-        _ = writeln!(std::io::stderr(), $($text)*);
-    }};
-}
-
-pub mod accuracy;
-pub mod board;
-pub mod calibrate;
-pub mod check;
-pub mod compare;
-pub mod convert;
-pub mod demo;
-pub mod excite;
-pub mod extruder_sim;
-pub mod identify;
-pub mod models;
-pub mod offset;
-pub mod outcome;
-pub mod plan;
-pub mod process;
-pub mod recorded;
-pub mod render;
-pub mod replay;
-pub mod reproduce;
-pub mod robot_sim;
-pub mod run;
-pub mod simulate;
-pub mod tune;
-pub mod verify;
+mod arguments;
+mod bed_plane;
+mod board_arguments;
+mod board_image;
+mod calibrate;
+mod camera;
+mod camera_offset;
+mod check;
+mod compare;
+mod demo;
+mod extruder;
+mod help;
+mod lab;
+mod live_cell;
+mod old_names;
+mod outcome;
+mod plan;
+mod process;
+mod recorded;
+mod replay;
+mod run;
+mod sim;
+mod simulate;
+mod simulated_cell;
+mod status;
+mod tune;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
-use clap::{ArgAction, Parser, Subcommand};
+use clap::{ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-use crate::assembly::{AssemblyError, LoadedCell};
-use crate::document::Problems;
-use crate::io::calibration_file::CalibrationFileError;
-use crate::io::model_file::ModelFileError;
-use crate::sim::cell::Rig;
-
-/// Status of a command that finished, but with too many frames refused or
-/// records lost.
-pub const WITH_LOSS: u8 = 3;
+use print::Voice;
+use status::status_of;
 
 /// Keeps an extruded bead at the width that was asked for.
 ///
@@ -75,122 +55,93 @@ pub const WITH_LOSS: u8 = 3;
 #[command(name = "truebead", version, propagate_version = true, max_term_width = 100)]
 pub struct Cli {
     /// Say more: -v what is being done, -vv every detail
-    #[arg(short, long, action = ArgAction::Count, global = true)]
+    #[arg(short, long, action = ArgAction::Count, global = true, display_order = 900)]
     verbose: u8,
     /// Say nothing but errors
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    #[arg(short, long, global = true, conflicts_with = "verbose", display_order = 901)]
     quiet: bool,
     #[command(subcommand)]
     command: Command,
 }
 
+/// In the order of their help: what is used daily, then the groups.
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::DemoArgs),
+    Check(check::CheckArgs),
     Run(run::RunArgs),
     Process(process::ProcessArgs),
     Calibrate(calibrate::CalibrateArgs),
-    Board(board::SheetArgs),
-    Verify(verify::VerifyArgs),
-    Convert(convert::ConvertArgs),
+    Tune(tune::TuneArgs),
+    Plan(plan::PlanArgs),
     Simulate(simulate::SimulateArgs),
     Compare(compare::CompareArgs),
-    Render(render::RenderArgs),
-    RobotSim(robot_sim::RobotSimArgs),
-    ExtruderSim(extruder_sim::ExtruderSimArgs),
     Replay(replay::ReplayArgs),
-    Reproduce(reproduce::ReproduceArgs),
-    Accuracy(accuracy::AccuracyArgs),
-    Check(check::CheckArgs),
-    Offset(offset::OffsetArgs),
-    Excite(excite::ExciteArgs),
-    Identify(Box<identify::IdentifyArgs>),
-    Models(models::ModelsArgs),
-    Plan(plan::PlanArgs),
-    Tune(tune::TuneArgs),
-}
-
-/// How much a command says on standard error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Voice {
-    /// Nothing but errors.
-    pub quiet: bool,
-}
-
-/// Arguments that cannot be followed; ends with exit status 2.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct WrongArguments(String);
-
-impl WrongArguments {
-    /// With what was found and what was expected.
-    #[expect(clippy::needless_pass_by_value, reason = "an error or a new text at every call")]
-    pub fn new(what: impl ToString) -> Self {
-        Self(what.to_string())
-    }
+    #[command(
+        subcommand,
+        after_help = "\
+Example:
+  truebead camera board --board 9x6 --square-mm 20 --out board.pdf"
+    )]
+    Camera(camera::CameraCommand),
+    #[command(
+        subcommand,
+        after_help = "\
+Example:
+  truebead extruder columns log.csv"
+    )]
+    Extruder(extruder::ExtruderCommand),
+    #[command(
+        subcommand,
+        after_help = "\
+Example:
+  truebead sim robot --endless"
+    )]
+    Sim(sim::SimCommand),
+    #[command(
+        subcommand,
+        after_help = "\
+Example:
+  truebead lab reproduce barjuei2022 --out barjuei2022"
+    )]
+    Lab(lab::LabCommand),
 }
 
 /// Runs the program.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let matches = help::with_groups(Cli::command()).try_get_matches();
+    let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
+        Ok(cli) => cli,
+        Err(error) => match old_names::refusal(&error) {
+            Some(refusal) => {
+                tell!("error: {refusal}");
+                return ExitCode::from(2);
+            }
+            None => error.exit(),
+        },
+    };
     listen(&cli);
     let voice = Voice { quiet: cli.quiet };
     let done = match &cli.command {
         Command::Demo(args) => demo::run(args, voice),
+        Command::Check(args) => check::run(args),
         Command::Run(args) => run::run(args, voice),
         Command::Process(args) => process::run(args, voice),
-        Command::Board(args) => board::run(args).map(|()| ExitCode::SUCCESS),
-        Command::Verify(args) => verify::run(args),
-        Command::Convert(args) => convert::run(args, voice).map(|()| ExitCode::SUCCESS),
         Command::Calibrate(args) => calibrate::run(args),
-        Command::Simulate(args) => simulate::run(args, voice),
-        Command::Compare(args) => compare::run(args, voice),
-        Command::Render(args) => render::run(args, voice).map(|()| ExitCode::SUCCESS),
-        Command::RobotSim(args) => robot_sim::run(args).map(|()| ExitCode::SUCCESS),
-        Command::ExtruderSim(args) => extruder_sim::run(args).map(|()| ExitCode::SUCCESS),
-        Command::Reproduce(args) => reproduce::run(args, voice),
-        Command::Replay(args) => replay::run(args),
-        Command::Accuracy(args) => accuracy::run(args, voice),
-        Command::Check(args) => check::run(args),
-        Command::Offset(args) => offset::run(args),
-        Command::Excite(args) => excite::run(args).map(|()| ExitCode::SUCCESS),
-        Command::Identify(args) => identify::run(args).map(|()| ExitCode::SUCCESS),
-        Command::Models(args) => models::run(args),
         Command::Tune(args) => tune::run(args, voice),
         Command::Plan(args) => plan::run(args).map(|()| ExitCode::SUCCESS),
+        Command::Simulate(args) => simulate::run(args, voice),
+        Command::Compare(args) => compare::run(args, voice),
+        Command::Replay(args) => replay::run(args),
+        Command::Camera(command) => camera::run(command, voice),
+        Command::Extruder(command) => extruder::run(command),
+        Command::Sim(command) => sim::run(command),
+        Command::Lab(command) => lab::run(command, voice),
     };
     done.unwrap_or_else(|error| {
         tell!("error: {error:#}");
         status_of(&error)
     })
-}
-
-/// The extruder side of a simulated cell, with what is to be said about it.
-fn simulated_extruder(loaded: &LoadedCell) -> anyhow::Result<Option<Rig>> {
-    let side = loaded.simulated_extruder()?;
-    if let Some(side) = &side {
-        warn(&side.warnings);
-    }
-    Ok(side.map(|side| side.rig))
-}
-
-/// Prints warnings about a cell; nothing of them keeps it from running.
-fn warn(warnings: &[String]) {
-    for warning in warnings {
-        tell!("warning: {warning}");
-    }
-}
-
-/// Configuration and arguments are told from failures at work.
-fn status_of(error: &anyhow::Error) -> ExitCode {
-    let wrong = error.chain().any(|cause| {
-        cause.is::<WrongArguments>()
-            || cause.is::<Problems>()
-            || cause.is::<CalibrationFileError>()
-            || cause.is::<ModelFileError>()
-            || cause.downcast_ref().is_some_and(AssemblyError::is_in_file)
-    });
-    ExitCode::from(if wrong { 2 } else { 1 })
 }
 
 /// Sends the library's words to standard error.

@@ -1,7 +1,9 @@
 //! What people look at: pages, plots, overlays, boards to print.
 
 pub mod calibration;
+pub mod chart;
 pub mod compare;
+pub mod html;
 pub mod identify;
 pub mod image;
 pub mod offset;

@@ -5,6 +5,5 @@ pub mod frame_row;
 pub mod log;
 pub mod names;
 pub mod output;
-pub mod setup;
 pub mod summary;
 pub mod widths;

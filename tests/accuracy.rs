@@ -1,4 +1,4 @@
-//! `truebead accuracy` on a few frames: that every set is measured, that what
+//! `truebead lab accuracy` on a few frames: that every set is measured, that what
 //! nothing disturbs is measured to its bound, and that what is disturbed is not
 //! far off, and not silently wrong in the few frames here.
 
@@ -11,7 +11,7 @@ use serde_json::Value;
 
 fn accuracy(args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_truebead"));
-    command.arg("accuracy").args(args);
+    command.args(["lab", "accuracy"]).args(args);
     command
 }
 

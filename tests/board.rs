@@ -1,4 +1,4 @@
-//! `truebead board` and `truebead verify`.
+//! `truebead camera board` and `truebead camera verify`.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail")]
 
@@ -57,7 +57,7 @@ fn scene(folder: &Path, higher_mm: f64) -> (PathBuf, PathBuf) {
 
 fn verify(calibration: &Path, picture: &Path, more: &[&str]) -> Command {
     let mut command = truebead();
-    command.arg("verify").arg(picture).arg("--calibration").arg(calibration);
+    command.args(["camera", "verify"]).arg(picture).arg("--calibration").arg(calibration);
     command.args(["--board", "9x6", "--square-mm", "20"]).args(more);
     command
 }
@@ -110,7 +110,7 @@ fn a_printed_board_is_whole_or_not_there() {
     let make = |name: &str, more: &[&str]| {
         let mut command = truebead();
         let out = scratch.path().join(name);
-        command.args(["board", "--board", "9x6", "--square-mm", "20", "--out"]).arg(&out);
+        command.args(["camera", "board", "--board", "9x6", "--square-mm", "20", "--out"]).arg(&out);
         command.args(more);
         (command, out)
     };
@@ -142,7 +142,7 @@ fn the_board_that_is_kept_is_the_one_that_is_made() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let kept = root.join(format!("calib/{name}_9x6_20mm_a4.{ending}"));
         let out = scratch.path().join(format!("board.{ending}"));
-        let run = ["board", "--board", "9x6", "--square-mm", "20", "--out"];
+        let run = ["camera", "board", "--board", "9x6", "--square-mm", "20", "--out"];
         truebead().args(run).arg(&out).args(more).assert().code(0);
         assert!(fs::read(&out).unwrap() == fs::read(&kept).unwrap(), "{}", kept.display());
     }

@@ -1,4 +1,4 @@
-//! `truebead convert`: there and back, with a bed plane from pictures, and with bad
+//! `truebead camera convert`: there and back, with a bed plane from pictures, and with bad
 //! input.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail")]
@@ -59,7 +59,7 @@ fn calibration(path: &Path) {
 /// Runs the command in a folder.
 fn convert(folder: &Path, arguments: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_truebead"));
-    command.current_dir(folder).arg("convert").args(arguments.split_whitespace());
+    command.current_dir(folder).args(["camera", "convert"]).args(arguments.split_whitespace());
     command
 }
 

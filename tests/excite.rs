@@ -1,4 +1,4 @@
-//! `truebead excite`: profiles that a cell plays, and what is answered to ones that
+//! `truebead extruder excite`: profiles that a cell plays, and what is answered to ones that
 //! it cannot.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
@@ -17,7 +17,7 @@ fn profiles_are_written_as_a_cell_plays_them() {
     let out = folder.path().join("profile.csv");
     let excite = |args: &str| {
         let _ = fs::remove_file(&out);
-        let mut command = truebead(&["excite"]);
+        let mut command = truebead(&["extruder", "excite"]);
         command.args(args.split(' ')).arg("--out").arg(&out);
         command
     };
@@ -52,7 +52,7 @@ fn profiles_are_written_as_a_cell_plays_them() {
 fn what_no_extruder_can_be_told_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let excite = |args: &str, code: i32| {
-        let mut command = truebead(&["excite", "prbs", "--low", "20", "--high", "40"]);
+        let mut command = truebead(&["extruder", "excite", "prbs", "--low", "20", "--high", "40"]);
         said(command.args(args.split(' ')).arg("--out").arg(folder.path().join("p.csv")), code)
     };
     let short = excite("--hold-s 1e-9 --quantity screw_rpm", 2);
@@ -71,12 +71,13 @@ fn what_is_there_is_not_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let profile = folder.path().join("profile.csv");
     fs::write(&profile, "mine").unwrap();
-    let steps = ["excite", "steps", "--levels", "20,30", "--hold-s", "5", "--quantity", "rpm"];
+    let steps =
+        ["extruder", "excite", "steps", "--levels", "20,30", "--hold-s", "5", "--quantity", "rpm"];
     let taken = said(truebead(&steps).arg("--out").arg(&profile), 2);
     assert!(taken.contains("profile.csv is there already and would be lost"), "{taken}");
     assert_eq!(fs::read_to_string(&profile).unwrap(), "mine");
     fs::write(folder.path().join("other.csv"), "mine").unwrap();
-    let taken = said(truebead(&["identify", "--example"]).arg(folder.path()), 2);
+    let taken = said(truebead(&["extruder", "identify", "--example"]).arg(folder.path()), 2);
     assert!(taken.contains("other.csv is there already and would be lost"), "{taken}");
     assert!(!folder.path().join("log.csv").exists());
 }
@@ -84,8 +85,8 @@ fn what_is_there_is_not_replaced() {
 #[test]
 fn a_fault_before_the_start_is_named() {
     let cell = concat!(env!("CARGO_MANIFEST_DIR"), "/cells/extruder.toml");
-    let sim = said(&mut truebead(&["extruder-sim", cell, "--fail-after-s", "-1"]), 2);
+    let sim = said(&mut truebead(&["sim", "extruder", cell, "--fail-after-s", "-1"]), 2);
     assert!(sim.contains("expected seconds after the start of the pump, 0 to 1e7"), "{sim}");
-    let robot = said(&mut truebead(&["robot-sim", "--pause-s", "-1"]), 2);
+    let robot = said(&mut truebead(&["sim", "robot", "--pause-s", "-1"]), 2);
     assert!(robot.contains("expected 0 to 3600 seconds"), "{robot}");
 }

@@ -1,4 +1,4 @@
-//! `truebead identify` and `models`: from a log to a model that a
+//! `truebead extruder identify` and `models`: from a log to a model that a
 //! cell can look up, and what bad data are answered with.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
@@ -19,7 +19,7 @@ use common::{said, truebead};
 /// The command for a log in a folder, which finds one form quickly.
 fn identify(log: &Path, more: &[&str]) -> Command {
     let columns = ["--input", "screw_rpm", "--output", "flow_mm3_per_s", "--model", "sopdt"];
-    let mut command = truebead(&["identify"]);
+    let mut command = truebead(&["extruder", "identify"]);
     command.arg(log).args(columns).args(more);
     command.arg("--out").arg(log.with_extension("out"));
     command
@@ -58,10 +58,11 @@ fn each(lines: &mut [String], change: impl Fn(usize, [f64; 3]) -> [f64; 3]) {
 fn the_example_becomes_a_model_that_is_found_in_a_library() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let example = said(&mut truebead(&["identify", "--example", &at("example")]), 0);
+    let example = said(&mut truebead(&["extruder", "identify", "--example", &at("example")]), 0);
     assert!(example.contains("gain 19.05"), "{example}");
     let answer = said(
         &mut truebead(&[
+            "extruder",
             "identify",
             &at("example/log.csv"),
             "--input",
@@ -103,11 +104,11 @@ fn the_example_becomes_a_model_that_is_found_in_a_library() {
     assert_eq!(fs::read_to_string(at(kept)).unwrap(), text);
     fs::rename(at(kept), at("models/pla-210.toml")).unwrap();
     fs::write(at("models/petg.toml"), text.replace("\"PLA\"", "\"PETG\"")).unwrap();
-    let list = said(&mut truebead(&["models", &at("models")]), 0);
+    let list = said(&mut truebead(&["extruder", "models", &at("models")]), 0);
     assert!(list.contains("petg.toml") && list.contains("pla-210.toml"), "{list}");
     let wanted = |temperature: &'static str| {
         let look = ["--material", "pla", "--nozzle-mm", "0.4", "--temperature-c", temperature];
-        let mut command = truebead(&["models", &at("models")]);
+        let mut command = truebead(&["extruder", "models", &at("models")]);
         command.args(look);
         command
     };
@@ -120,7 +121,8 @@ fn the_example_becomes_a_model_that_is_found_in_a_library() {
     assert!(twice.contains("2 models for pla") && twice.contains("again.toml"), "{twice}");
     fs::write(at("models/wrong.toml"), text.replace("numerator", "nominator")).unwrap();
     fs::remove_file(at("models/again.toml")).unwrap();
-    let list = truebead(&["models", &at("models")]).assert().code(2).get_output().clone();
+    let list =
+        truebead(&["extruder", "models", &at("models")]).assert().code(2).get_output().clone();
     let [listed, wrong] = [list.stdout, list.stderr].map(|text| String::from_utf8(text).unwrap());
     assert!(wrong.contains("transfer.nominator: found an unknown key"), "{wrong}");
     assert!(listed.contains("petg.toml") && !listed.contains("wrong.toml"), "{listed}");
@@ -136,7 +138,7 @@ fn no_model_is_replaced() {
     let library = folder.path().join("library");
     let holds_for = "--material PLA --nozzle-mm 0.4 --temperature-c 210 --library";
     let keep = |out: &str, form: &str, code: i32| {
-        let mut command = truebead(&["identify"]);
+        let mut command = truebead(&["extruder", "identify"]);
         let columns = ["--input", "screw_rpm", "--output", "flow_mm3_per_s", "--model", form];
         command.arg(&log).args(columns).args(holds_for.split(' ')).arg(&library);
         said(command.arg("--out").arg(folder.path().join(out)), code)
@@ -240,7 +242,7 @@ fn arguments_that_are_wrong() {
     let folder = tempfile::tempdir().unwrap();
     let log = log(folder.path(), |_| {});
     let other = |input: &str| {
-        let mut command = truebead(&["identify", log.to_str().unwrap()]);
+        let mut command = truebead(&["extruder", "identify", log.to_str().unwrap()]);
         command.args(["--input", input, "--output", "flow_mm3_per_s"]);
         command
     };
@@ -296,13 +298,13 @@ fn from_a_simulated_run_to_a_cell_with_the_model() {
     let folder = tempfile::tempdir().unwrap();
     let recording = recorded(folder.path(), |text| text);
     let recording = recording.to_str().unwrap();
-    let list = said(&mut truebead(&["identify", recording]), 0);
+    let list = said(&mut truebead(&["extruder", "columns", recording]), 0);
     for part in ["command_rpm ", "50.00 Hz", "width_mm ", "laid_flow_mm3_per_s ", "mm³/s"] {
         assert!(list.contains(part), "{part} in {list}");
     }
     let out = folder.path().join("model");
     let columns = ["--input", "command_rpm", "--output", "laid_flow_mm3_per_s", "--from-s", "4"];
-    let mut command = truebead(&["identify", recording, "--model", "sopdt"]);
+    let mut command = truebead(&["extruder", "identify", recording, "--model", "sopdt"]);
     let answer = said(command.args(columns).arg("--out").arg(&out), 0);
     // The cell's plant: 18 / (0.656 s² + 0.975 s + 1), 0.25 s of dead time.
     for (name, truth) in
@@ -337,7 +339,7 @@ fn what_a_recording_cannot_be_asked_for() {
     let recording = recorded(folder.path(), shorter);
     let recording = recording.to_str().unwrap();
     let ask = |args: &str, code| {
-        let mut command = truebead(&["identify", recording]);
+        let mut command = truebead(&["extruder", "identify", recording]);
         said(command.args(args.split(' ')).arg("--out").arg(folder.path().join("m")), code)
     };
     let told = ask("--input command_v --output width_mm", 2);
@@ -384,7 +386,7 @@ fn a_flow_that_was_measured_on_the_bead_is_the_flow_at_the_nozzle() {
     let folder = tempfile::tempdir().unwrap();
     let log = bead_log(folder.path());
     let ask = |args: &str, code| {
-        let mut command = truebead(&["identify"]);
+        let mut command = truebead(&["extruder", "identify"]);
         command.arg(&log).args(args.split(' ')).args(["--model", "sopdt", "--input", "screw_rpm"]);
         let out = tempfile::tempdir_in(folder.path()).unwrap();
         said(command.arg("--out").arg(out.path()), code)
@@ -422,7 +424,7 @@ fn a_flow_that_was_measured_on_the_bead_is_the_flow_at_the_nozzle() {
         let told = ask(args, code);
         assert!(told.contains(expected), "{args}: {told}");
     }
-    let list = said(truebead(&["identify"]).arg(&log), 0);
+    let list = said(truebead(&["extruder", "columns"]).arg(&log), 0);
     assert!(list.contains("area_mm2 ") && list.contains("50.00 Hz"), "{list}");
     assert!(!list.contains("time_s"), "{list}");
 }
@@ -442,10 +444,10 @@ fn the_noise_of_a_pressure_is_told_in_the_keys_of_a_cell() {
     }
     fs::write(&file, &text).unwrap();
     let of = |more: &[&str], code| {
-        let mut command = truebead(&["identify"]);
+        let mut command = truebead(&["extruder", "noise"]);
         said(command.arg(&file).args(more), code)
     };
-    let told = of(&["--noise", "nozzle_bar"], 0);
+    let told = of(&["--column", "nozzle_bar"], 0);
     let value = |key: &str| {
         let line = told.lines().find(|line| line.starts_with(key)).unwrap();
         line.split_whitespace().nth(2).unwrap().parse::<f64>().unwrap()
@@ -455,9 +457,9 @@ fn the_noise_of_a_pressure_is_told_in_the_keys_of_a_cell() {
     for (column, code, words) in
         [("screw_rpm", 2, "expected a pressure"), ("nozzle_mpa", 2, "nozzle_mpa")]
     {
-        let told = of(&["--noise", column], code);
+        let told = of(&["--column", column], code);
         assert!(told.contains(words), "{told}");
     }
-    let few = of(&["--noise", "nozzle_bar", "--from-s", "118"], 1);
+    let few = of(&["--column", "nozzle_bar", "--from-s", "118"], 1);
     assert!(few.contains("at least 200"), "{few}");
 }

@@ -118,7 +118,17 @@ fn a_killed_run_leaves_all_but_the_last_second() {
 fn a_run_against_a_robot_ends_in_order_on_a_signal() {
     let folder = tempfile::tempdir().unwrap();
     let mut robot = truebead()
-        .args(["robot-sim", "--listen", "127.0.0.1:0", "--endless", "--max", "160", "--min", "50"])
+        .args([
+            "sim",
+            "robot",
+            "--listen",
+            "127.0.0.1:0",
+            "--endless",
+            "--max",
+            "160",
+            "--min",
+            "50",
+        ])
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();

@@ -1,4 +1,4 @@
-//! `truebead offset`: from a recorded bead, and from a board under the nozzle.
+//! `truebead camera offset`: from a recorded bead, and from a board under the nozzle.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may fail")]
 
@@ -20,7 +20,7 @@ use common::{said, truebead};
 const SIZE: [u32; 2] = [640, 480];
 
 fn offset(input: &Path, more: &[&str]) -> Command {
-    let mut command = truebead(&["offset"]);
+    let mut command = truebead(&["camera", "offset"]);
     command.arg(input).args(more);
     command
 }

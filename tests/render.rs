@@ -1,4 +1,4 @@
-//! Rendered frames: `truebead render`, the frames in `test_images`, and what
+//! Rendered frames: `truebead lab render`, the frames in `test_images`, and what
 //! the measurement makes of frames whose truth is known.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test may fail")]
@@ -121,7 +121,7 @@ fn the_calibrations_share_is_in_the_sigma_of_each_width_and_in_nothing_else() {
 
 fn render(scenario: &Path, out: &Path, more: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_truebead"));
-    command.arg("render").arg(scenario).arg("--out").arg(out).args(more);
+    command.args(["lab", "render"]).arg(scenario).arg("--out").arg(out).args(more);
     command
 }
 

@@ -95,7 +95,7 @@ fn beads(folder: &Path, height_mm: f64) -> (PathBuf, Vec<f64>) {
     )
     .unwrap();
     let frames = folder.join(format!("frames-{height_mm}"));
-    truebead(&["render", text(&scenario), "--out", text(&frames)]).assert().success();
+    truebead(&["lab", "render", text(&scenario), "--out", text(&frames)]).assert().success();
     let widths = column(&frames.join("truth.csv"), 2);
     (frames, widths)
 }

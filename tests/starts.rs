@@ -1,4 +1,4 @@
-//! `truebead identify --starts`: from a log of starts and stops to a file, and
+//! `truebead extruder starts`: from a log of starts and stops to a file, and
 //! what a log that does not tell them is answered with.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
@@ -17,7 +17,7 @@ use common::{said, truebead};
 
 /// The command for a log in a folder.
 fn starts(log: &Path, more: &[&str]) -> Command {
-    let mut command = truebead(&["identify", "--starts", "--input", "screw_rpm"]);
+    let mut command = truebead(&["extruder", "starts", "--input", "screw_rpm"]);
     command.arg(log).args(["--out"]).arg(log.with_extension("out")).args(more);
     command
 }
@@ -47,13 +47,13 @@ fn answer(
 fn the_example_becomes_a_file_that_is_read_again() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let told = said(&mut truebead(&["identify", "--example", &at("example")]), 0);
+    let told = said(&mut truebead(&["extruder", "identify", "--example", &at("example")]), 0);
     assert!(told.contains("starts.csv") && told.contains("520 mm³ within 18 s"), "{told}");
     let log = at("example/starts.csv");
-    let columns = ["--input", "screw_rpm", "--output", "flow_mm3_per_s", "--starts"];
+    let columns = ["--input", "screw_rpm", "--output", "flow_mm3_per_s"];
     let holds_for = ["--material", "PLA", "--nozzle-mm", "4", "--temperature-c", "210"];
     let fit = |code| {
-        let mut command = truebead(&["identify", &log]);
+        let mut command = truebead(&["extruder", "starts", &log]);
         command.args(columns).args(holds_for).args(["--out", &at("found")]);
         said(&mut command, code)
     };
@@ -130,12 +130,15 @@ fn arguments_that_are_wrong() {
     let log = log(folder.path(), &few, |text| text);
     let flow = ["--output", "flow_mm3_per_s"];
     for (more, expected) in [
-        (vec![], "--starts needs --input"),
+        (vec![], "--output <COLUMN>"),
         (vec!["--output", "screw_rpm"], "are both screw_rpm"),
         (vec!["--output", "flow2_mm3_per_s"], "no column flow2_mm3_per_s"),
-        ([&flow[..], &["--model", "fopdt"]].concat(), "cannot be used with"),
-        ([&flow[..], &["--smooth", "11,3"]].concat(), "cannot be used with"),
-        ([&flow[..], &["--noise", "nozzle_mpa"]].concat(), "cannot be used with"),
+        ([&flow[..], &["--model", "fopdt"]].concat(), "unexpected argument"),
+        ([&flow[..], &["--smooth", "11,3"]].concat(), "unexpected argument"),
+        (
+            [&flow[..], &["--noise", "nozzle_mpa"]].concat(),
+            "is a command now: `truebead extruder noise",
+        ),
     ] {
         let said = said(&mut starts(&log, &more), 2);
         assert!(said.contains(expected), "{more:?}: {said}");

@@ -67,7 +67,7 @@ pub fn files(part: &ExtruderPart, cell: &str) -> Result<ExtruderFiles, AssemblyE
     let file = strategy_file(part, cell, &mut warnings)?;
     let mut files: Vec<ExtruderFile> = file.into_iter().collect();
     for (name, what, makes, path) in [
-        (STARTS_ATTACHMENT, "starts", "identify --starts", &part.extruder.starts),
+        (STARTS_ATTACHMENT, "starts", "extruder starts", &part.extruder.starts),
         (PLAN_ATTACHMENT, "plan", "plan", &part.extruder.plan),
     ] {
         let Some(path) = path else { continue };

@@ -8,8 +8,9 @@ use std::process::ExitCode;
 use clap::Args;
 use nalgebra::Point3;
 
-use super::WrongArguments;
-use super::calibrate::check_writable;
+use super::arguments::WrongArguments;
+use super::arguments::check_writable;
+use super::print::warn;
 use crate::assembly::{ExtruderSide, LoadedCell, beyond, steady};
 use crate::calibration::Calibration;
 use crate::cell::Cell;
@@ -27,7 +28,7 @@ const UNLIKELY_NEAR: Mm = Mm::constant(0.5);
 
 /// Validates a cell file and all it refers to.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(after_help = "\
 Example:
   truebead check cells/barjuei2022.toml
 
@@ -60,7 +61,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
     // sound.
     let side = run.as_ref().map_or(Ok(None), LoadedCell::extruder)?;
     if let Some(side) = &side {
-        super::warn(&side.warnings);
+        warn(&side.warnings);
     }
     run.as_ref().map_or(Ok(()), LoadedCell::check_sight)?;
     check_gauge(&loaded)?;

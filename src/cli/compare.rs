@@ -6,7 +6,8 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::Args;
 
-use super::{Voice, WrongArguments};
+use super::arguments::WrongArguments;
+use super::print::Voice;
 use crate::assembly::LoadedCell;
 use crate::cell::file::{Purpose, RunPart};
 use crate::core::units::Mm;
@@ -19,9 +20,9 @@ use crate::trials::compare::{Contender, Figures};
 /// Most controllers: as many as there are colours.
 const MOST: usize = 6;
 
-/// Lays the same simulated bead with several controllers and tells how well each does it.
+/// Lays the same simulated bead with several controllers and compares them.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(after_help = "\
 Example:
   truebead compare cells/barjuei2022.toml cells/distance.toml --widths 44,42,40,38 --out compared
 

@@ -7,7 +7,9 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::Args;
 
-use super::{Voice, outcome, run};
+use super::arguments::{free_folder, parse_seconds};
+use super::live_cell::drive;
+use super::print::Voice;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::core::time::Span;
@@ -26,7 +28,7 @@ const SHIPPED_ADDRESS: &str = "127.0.0.1:5653";
 /// Frames of a simulated bead are rendered and measured, a simulated robot
 /// behind a real TCP socket is controlled, and everything is recorded.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(after_help = "\
 Example:
   truebead demo --out demo --seconds 20
 
@@ -36,13 +38,13 @@ pub struct DemoArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// How long to run [s]
-    #[arg(long, value_name = "S", default_value = "20", value_parser = run::parse_seconds)]
+    #[arg(long, value_name = "S", default_value = "20", value_parser = parse_seconds)]
     seconds: f64,
 }
 
 /// Runs the command.
 pub fn run(args: &DemoArgs, voice: Voice) -> anyhow::Result<ExitCode> {
-    let out = args.out.clone().unwrap_or_else(|| outcome::free_folder("truebead-demo"));
+    let out = args.out.clone().unwrap_or_else(|| free_folder("truebead-demo"));
     let clock = RunClock::start();
     let listener = TcpListener::bind("127.0.0.1:0").context("cannot listen on this machine")?;
     let robot = RobotSim::spawn(listener, clock, robot_options(), Box::new(|_, _| {}))?;
@@ -55,7 +57,7 @@ pub fn run(args: &DemoArgs, voice: Voice) -> anyhow::Result<ExitCode> {
             robot.local_addr()
         );
     }
-    let status = run::drive(loaded, &out, "Demo".into(), Some(args.seconds), clock, voice);
+    let status = drive(loaded, &out, "Demo".into(), Some(args.seconds), clock, voice);
     robot.stop();
     status
 }

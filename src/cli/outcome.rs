@@ -1,51 +1,12 @@
 //! What a live run says at its end, and its exit status.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
-use super::{WITH_LOSS, WrongArguments};
+use super::status::WITH_LOSS;
 use crate::live::{Ending, LiveReport};
 use crate::rows::names;
 use crate::rows::summary::Summary;
-
-/// A folder name that is free: the name itself, or with the first number that
-/// is.
-pub fn free_folder(name: &str) -> PathBuf {
-    let taken = |path: &Path| path.exists();
-    let first = PathBuf::from(name);
-    if !taken(&first) {
-        return first;
-    }
-    (2u32..=9999)
-        .map(|n| PathBuf::from(format!("{name}-{n}")))
-        .find(|path| !taken(path))
-        .unwrap_or(first)
-}
-
-/// Refuses a folder that holds a recording: what is about to be written there
-/// would replace it, or stand beside one that it does not belong to.
-pub fn refuse_a_recording_in(folder: &Path) -> Result<(), WrongArguments> {
-    let names = ["recording.mcap", "recording.mcap.partial"];
-    match names.map(|name| folder.join(name)).into_iter().find(|file| file.exists()) {
-        Some(found) => Err(WrongArguments::new(format!(
-            "{} is there already, of another run; name another folder with --out",
-            found.display()
-        ))),
-        None => Ok(()),
-    }
-}
-
-/// Refuses the name of an output that is there already: what somebody wrote is
-/// never replaced.
-pub fn refuse_replacing(path: &Path, what: &str) -> Result<(), WrongArguments> {
-    if !path.exists() {
-        return Ok(());
-    }
-    Err(WrongArguments::new(format!(
-        "{} is there already and would be lost; name another {what} with --out",
-        path.display()
-    )))
-}
 
 /// Prints the figures of a run to standard output, and gives its status.
 pub fn tell(report: &LiveReport, out: &Path, max_rejected_share: f64) -> ExitCode {

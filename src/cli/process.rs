@@ -9,7 +9,9 @@ use anyhow::Context;
 use clap::Args;
 use crossbeam_channel::{Sender, bounded};
 
-use super::{Voice, WITH_LOSS, WrongArguments};
+use super::arguments::WrongArguments;
+use super::print::Voice;
+use super::status::WITH_LOSS;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::drivers::camera::mcap::RobotZ;
@@ -34,7 +36,7 @@ const NAMED: u64 = 10;
 
 /// Measures the bead in recorded frames.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(after_help = "\
 Examples:
   truebead process frames/ --cell cell.toml --out measured/
   truebead process clip.mp4 --cell cell.toml --out measured/

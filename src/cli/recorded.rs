@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::WrongArguments;
+use super::arguments::WrongArguments;
 use crate::calibration::{Calibration, file};
 use crate::cell::Cell;
 use crate::cell::file::{CalibrationSource, Purpose};

@@ -8,8 +8,9 @@ use anyhow::{Context, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::WrongArguments;
+use super::arguments::WrongArguments;
 use super::recorded::attached;
+use super::status::WITH_LOSS;
 use crate::assembly::extruder;
 use crate::cell::file::{ExtruderPart, Purpose};
 use crate::control::Controller;
@@ -18,8 +19,6 @@ use crate::io::record::ExtruderFile;
 use crate::io::recording::{Entry, Recording};
 use crate::io::replay::{Difference, ReplayReport, replay};
 
-/// Exit status of a replay that had to end before the recording did.
-const RECORDS_LOST: u8 = 3;
 /// Entries between two updates of the progress display.
 const PROGRESS_EVERY: u64 = 4096;
 
@@ -35,8 +34,7 @@ it goes.
 Exit status: 0 all steps are the same, 1 a step differs, 2 the file is not a
 recording that can be replayed, 3 events are missing from its middle.";
 
-/// Feeds the recorded events to the controller and compares its steps with the
-/// recorded ones, bit for bit.
+/// Feeds recorded events to the controller and compares its steps bit for bit.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLE)]
 pub struct ReplayArgs {
@@ -141,7 +139,7 @@ fn tell(report: &ReplayReport) -> ExitCode {
             gap.expected,
             gap.found
         );
-        return ExitCode::from(RECORDS_LOST);
+        return ExitCode::from(WITH_LOSS);
     }
     ExitCode::SUCCESS
 }

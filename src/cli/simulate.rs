@@ -8,28 +8,30 @@ use std::time::Instant;
 use anyhow::Context;
 use clap::Args;
 
-use super::{Voice, WITH_LOSS, outcome};
+use super::arguments::refuse_a_recording_in;
+use super::outcome;
+use super::print::Voice;
+use super::simulated_cell::{SimRecorder, simulated_extruder};
+use super::status::WITH_LOSS;
 use crate::assembly::LoadedCell;
-use crate::cell::file::{KeepFrames, Purpose};
+use crate::cell::file::Purpose;
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::core::units::{Mm, Mm3PerS};
 use crate::io::progress::Progress;
-use crate::io::record::{self, RecordConfig, RecorderHandle};
 use crate::io::stop::StopSignal;
 use crate::report::run::RunPage;
 use crate::rows::frame_row::{ControlColumns, FrameRow};
 use crate::rows::log::{ControlFacts, LogOptions, RunLog};
 use crate::rows::output::LogError;
 use crate::rows::summary::Note;
-use crate::run::ports::{RecordError, Recorder};
 use crate::sim::cell::{LayerEnd, Sight, SimCell, Witness};
 use crate::width_control::target::Target;
 
 /// Runs the closed loop on a simulated cell.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(after_help = "\
 Example:
   truebead simulate cells/barjuei2022.toml --out layer
 
@@ -56,13 +58,13 @@ pub struct SimulateArgs {
 
 /// Runs the command.
 pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
-    outcome::refuse_a_recording_in(&args.out)?;
+    refuse_a_recording_in(&args.out)?;
     let mut loaded = LoadedCell::read(&args.scenario, Purpose::Run)?;
     if let Some(seed) = args.seed {
         loaded.cell.simulation.seed = seed;
     }
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
-    let extruder = super::simulated_extruder(&loaded)?;
+    let extruder = simulated_extruder(&loaded)?;
     let law = extruder.as_ref().map(|rig| rig.setup.law.clone());
     let calibration = loaded.calibration.clone();
     let recorder = SimRecorder::of(args.record.then_some(&args.out), &loaded)?;
@@ -106,40 +108,6 @@ pub fn run(args: &SimulateArgs, voice: Voice) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     Ok(status(&loaded, &summary, end))
-}
-
-/// Keeps what happened, where that is asked for.
-pub(super) struct SimRecorder(Option<RecorderHandle>);
-
-impl SimRecorder {
-    /// Into a folder, if one is given.
-    pub(super) fn of(folder: Option<&PathBuf>, loaded: &LoadedCell) -> anyhow::Result<Self> {
-        let Some(folder) = folder else { return Ok(Self(None)) };
-        let config = RecordConfig {
-            frames: KeepFrames::None,
-            epoch_ns: 0,
-            cell_name: loaded.path.display().to_string(),
-            cell_text: loaded.text.clone(),
-            calibration_text: loaded.calibration_text.clone(),
-            extruder_files: loaded.extruder()?.map_or_else(Vec::new, |side| side.files),
-        };
-        let (recorder, _) = record::start(&config, folder)?;
-        Ok(Self(Some(recorder.waiting())))
-    }
-
-    /// Gives the recording its name.
-    pub(super) fn finish(self) -> anyhow::Result<()> {
-        if let Some(recorder) = self.0 {
-            recorder.finish()?;
-        }
-        Ok(())
-    }
-}
-
-impl Recorder for SimRecorder {
-    fn record(&mut self, now: Stamp, event: &Event, step: &Step) -> Result<(), RecordError> {
-        self.0.as_mut().map_or(Ok(()), |recorder| recorder.record(now, event, step))
-    }
 }
 
 fn status(loaded: &LoadedCell, summary: &crate::rows::summary::Summary, end: LayerEnd) -> ExitCode {

@@ -11,7 +11,7 @@ use crate::identify::library::{Entry, Library};
 #[derive(Debug, thiserror::Error)]
 pub enum ModelFileError {
     /// It cannot be read.
-    #[error("model {}: {what}; `truebead identify` makes one", path.display())]
+    #[error("model {}: {what}; `truebead extruder identify` makes one", path.display())]
     Read {
         /// Which file.
         path: PathBuf,
@@ -106,6 +106,6 @@ mod tests {
         let said = read_library(&folder.path().join("none")).unwrap_err().to_string();
         assert!(said.starts_with("folder of models"), "{said}");
         let said = read(&folder.path().join("none.toml")).unwrap_err().to_string();
-        assert!(said.contains("`truebead identify` makes one"), "{said}");
+        assert!(said.contains("`truebead extruder identify` makes one"), "{said}");
     }
 }

@@ -6,7 +6,7 @@ mod drawing;
 
 use maud::{Markup, html};
 
-use super::run::reloading_page;
+use super::html::reloading_page;
 use crate::calibration::board::Board;
 use crate::calibration::map;
 use crate::calibration::map::WidthMap;

@@ -5,14 +5,13 @@ use std::fmt::Write as _;
 use maud::{Markup, html};
 use serde::Serialize;
 
-use super::run::area::{Area, XAxis};
-use super::run::palette;
-use super::run::palette::Ink;
-use super::run::plot::{Layer, Plot, y_range};
-use super::run::sections::legend;
-use super::run::series::Series;
-use super::run::series::series;
-use super::run::whole_page;
+use super::chart::area::{Area, XAxis};
+use super::chart::legend::legend;
+use super::chart::palette;
+use super::chart::palette::Ink;
+use super::chart::plot::{Layer, Plot, y_range};
+use super::chart::series::Series;
+use super::html::whole_page;
 use crate::trials::compare::{Estimate, Figures, JUDGED_AFTER_MM, SCATTER_AFTER_MM};
 
 /// One number of one controller at one width, as `compare.json` has it.
@@ -226,8 +225,10 @@ impl Comparison {
     }
 
     fn draw(&self, width: f64, all: &[Figures]) -> Markup {
-        let errors: Vec<Series> = all.iter().map(|found| series(&found.course)).collect();
-        let beads: Vec<Series> = all.iter().map(|found| series(&found.example)).collect();
+        let errors: Vec<Series> =
+            all.iter().map(|found| found.course.iter().copied().collect()).collect();
+        let beads: Vec<Series> =
+            all.iter().map(|found| found.example.iter().copied().collect()).collect();
         let Some(range) = errors.iter().find_map(Series::extent) else { return html! {} };
         let axis = XAxis::path(range);
         let name = format!("{width} mm");

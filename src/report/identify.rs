@@ -4,23 +4,25 @@
 mod curves;
 mod doubts;
 mod json;
+mod model;
 mod page;
+mod refusal;
 pub mod starts;
 mod table;
 
-use crate::core::quantity::Quantity;
-use crate::identify::ahead::{Ahead, ahead};
+use crate::identify::ahead::ahead;
 use crate::identify::experiment::Experiment;
-use crate::identify::file::{self, ModelFile, Setting, Uncertainty};
 use crate::identify::fit::{
-    Before, Comparison, Fit, FitError, Note, Quality, Row, Samples, SamplesError, Settings,
-    SteadyGain, Structure, compare,
+    Before, Comparison, Fit, FitError, Note, Row, Samples, SamplesError, Settings, SteadyGain,
+    compare,
 };
 use crate::identify::residual::Autocorrelation;
 use crate::numeric::lti::Between;
 
 pub use json::to_json;
+pub use model::{Logs, Study, form};
 pub use page::page;
+pub use refusal::Refusal;
 pub use table::text;
 
 /// A gain that differs by so many standard errors and by this share of itself
@@ -33,138 +35,6 @@ const LIKELY_SHARE: f64 = 0.03;
 
 /// Lags of the residuals that are looked at, at most.
 const LAGS: usize = 300;
-
-/// Data and what they are called.
-#[derive(Debug, Clone)]
-pub struct Logs {
-    /// What goes in.
-    pub input: Quantity,
-    /// What comes out.
-    pub output: Quantity,
-    /// Where the data are from.
-    pub source: String,
-    /// What the model is fitted to.
-    pub estimation: Experiment,
-    /// What it is validated with, and where that is from.
-    pub validation: Option<(Experiment, String)>,
-    /// Whether the logs begin at rest.
-    pub from_rest: bool,
-}
-
-/// A model with all that is known of it.
-#[derive(Debug)]
-pub struct Study {
-    /// The data.
-    pub logs: Logs,
-    /// All that were fitted.
-    pub comparison: Comparison,
-    /// The one that was taken.
-    pub fit: Fit,
-    /// How well it foretells other data.
-    pub validation: Option<Quality>,
-    /// What it foretells there.
-    pub foretold: Option<Vec<f64>>,
-    /// Whether what it leaves hangs together.
-    pub residuals: Autocorrelation,
-    /// What the reader should know before the model is used.
-    pub warnings: Vec<String>,
-}
-
-/// No model that can be trusted.
-#[derive(Debug, thiserror::Error)]
-pub enum Refusal {
-    /// The data.
-    #[error(transparent)]
-    Data(#[from] SamplesError),
-    /// None of the forms.
-    #[error("no model can be trusted:{}{}", lines(.forms), beside(.drift.as_ref()))]
-    None {
-        /// Each form, and why it is none.
-        forms: Vec<(String, String)>,
-        /// What is said of an output that drifts.
-        drift: Option<String>,
-    },
-    /// It does not foretell other data.
-    #[error(
-        "the model ({form}, {estimation:.1} % on its own data) does not foretell the data to \
-         validate with: {validation:.1} %, no better than their mean. Are both of the same machine \
-         and material, and is the input the one that moves the output?{}", further(.drift.as_ref())
-    )]
-    Foretells {
-        /// Its form.
-        form: String,
-        /// Fit to its own data \[%\].
-        estimation: f64,
-        /// Fit to the others \[%\].
-        validation: f64,
-        /// What is said of an output that drifts.
-        drift: Option<String>,
-    },
-    /// It follows a drift of the output.
-    #[error(
-        "the output drifts: the gain of the model ({form}) is {gain:.4}, but {steady:.4} ± {sigma:.4} \
-         once a straight line in time is taken off input and output; what moves the output besides \
-         the input is in the model. Hold temperature and feed steady, use a part without the drift \
-         (--from-s, --to-s), or take the line out of the log"
-    )]
-    Drifts {
-        /// Its form.
-        form: String,
-        /// Its gain.
-        gain: f64,
-        /// The gain without the line.
-        steady: f64,
-        /// Standard error of that.
-        sigma: f64,
-    },
-    /// The output moves before the input does.
-    #[error(
-        "the output answers the input some {:.2} s before it comes: a model that may do so fits to \
-         {:.1} %, the best that does not to {:.1} %. Are both on one clock, each sample with the \
-         moment at which it was taken? A closed loop that moves the input after the output looks the \
-         same", .0.ahead_s, .0.fit_percent, .0.answering_percent
-    )]
-    Ahead(Ahead),
-}
-
-/// A line for each reason, before it the forms that it holds for.
-fn lines(refused: &[(String, String)]) -> String {
-    let mut lines: Vec<(String, &str)> = Vec::new();
-    for (form, why) in refused {
-        match lines.iter_mut().find(|(_, said)| said == why) {
-            Some((forms, _)) => *forms = format!("{forms}, {form}"),
-            None => lines.push((form.clone(), why)),
-        }
-    }
-    let lines: Vec<String> =
-        lines.iter().map(|(forms, why)| format!("\n  {forms}: {why}")).collect();
-    lines.concat()
-}
-
-fn none(comparison: &Comparison, logs: &Logs) -> Refusal {
-    let is_told = |row: &Row| matches!(row.fit, Err(FitError::Drift { .. }));
-    let drift = doubts::of_output(logs).filter(|_| !comparison.rows.iter().any(is_told));
-    Refusal::None { forms: comparison.rows.iter().map(refused).collect(), drift }
-}
-
-fn beside(sentence: Option<&String>) -> String {
-    sentence.map_or_else(String::new, |sentence| format!("\n  beside: {sentence}"))
-}
-
-fn further(sentence: Option<&String>) -> String {
-    sentence.map_or_else(String::new, |sentence| format!(" Further, {sentence}"))
-}
-
-/// A form by the word that the command takes for it.
-pub fn form(structure: Structure) -> String {
-    let zero = |zero| if zero { "-zero" } else { "" };
-    match structure {
-        Structure::FirstOrder { zero: with } => format!("fopdt{}", zero(with)),
-        Structure::SecondOrderReal { zero: with } => format!("sopdt-real{}", zero(with)),
-        Structure::SecondOrderOscillating { zero: with } => format!("sopdt{}", zero(with)),
-        Structure::Transfer { poles, zeros } => format!("{poles},{zeros}"),
-    }
-}
 
 /// Fits all forms and takes one, or says why none can be trusted.
 pub fn study(logs: Logs, forms: &[Settings]) -> Result<Study, Refusal> {
@@ -217,7 +87,7 @@ pub fn study(logs: Logs, forms: &[Settings]) -> Result<Study, Refusal> {
         warnings: Vec::new(),
     };
     study.warnings = study.doubts();
-    study.warnings.extend(steady.and_then(|steady| study.other_gain(&steady)));
+    study.warnings.extend(steady.and_then(|steady| other_gain(&study, &steady)));
     Ok(study)
 }
 
@@ -246,69 +116,23 @@ fn undetermined(note: &Note) -> Option<String> {
     Some(FitError::Undetermined(loose.clone()).to_string())
 }
 
-impl Study {
-    /// The slowest time constant of the model \[s\].
-    pub fn slowest_s(&self) -> f64 {
-        let poles = self.fit.model.poles();
-        let slowest = poles.iter().map(|pole| -pole.re).fold(f64::INFINITY, f64::min);
-        1.0 / slowest
-    }
+fn none(comparison: &Comparison, logs: &Logs) -> Refusal {
+    let is_told = |row: &Row| matches!(row.fit, Err(FitError::Drift { .. }));
+    let drift = doubts::of_output(logs).filter(|_| !comparison.rows.iter().any(is_told));
+    Refusal::None { forms: comparison.rows.iter().map(refused).collect(), drift }
+}
 
-    /// What is said of a gain that a drift may have moved.
-    fn other_gain(&self, steady: &SteadyGain) -> Option<String> {
-        let gain = self.fit.model.dc_gain();
-        let (sigmas, share) = steady.apart(gain);
-        (sigmas > LIKELY_SIGMAS && share > LIKELY_SHARE).then(|| {
-            format!(
-                "the gain is {gain:.4}, but {:.4} ± {:.4} once a straight line in time is taken off \
-                 input and output: the output drifts, and the model follows it in part",
-                steady.gain, steady.sigma
-            )
-        })
-    }
-
-    /// The model as a file keeps it.
-    pub fn model(&self, setting: Setting) -> ModelFile {
-        let fit = &self.fit;
-        let input = &self.logs.estimation.input;
-        let start = (f64::INFINITY, f64::NEG_INFINITY);
-        let input_range = input.iter().fold(start, |(low, high), v| (low.min(*v), high.max(*v)));
-        let parameters = fit.parameters.iter().map(|one| file::Parameter {
-            name: one.name.clone(),
-            value: one.value,
-            standard_error: one.sigma,
-        });
-        ModelFile {
-            setting,
-            kind: form(fit.settings.structure),
-            input: self.logs.input.clone(),
-            output: self.logs.output.clone(),
-            input_range,
-            operating_point: (fit.input_level, fit.output_level),
-            transfer: fit.model.clone(),
-            uncertainty: Some(Uncertainty {
-                parameters: parameters.collect(),
-                // Symmetric, so that rows are columns.
-                covariance: fit.covariance.iter().copied().collect(),
-            }),
-            fit: Some(file::Fit {
-                step_s: self.logs.estimation.step_s,
-                estimation_percent: fit.quality.fit_percent,
-                validation_percent: self.validation.map(|quality| quality.fit_percent),
-            }),
-        }
-    }
-
-    /// The unit of a parameter.
-    pub fn unit_of(&self, name: &str) -> String {
-        let (input, output) = (self.logs.input.unit, self.logs.output.unit);
-        match name {
-            "gain" => format!("{output} per {input}"),
-            "output_level" => output.to_string(),
-            _ if name.ends_with("_s") => "s".to_owned(),
-            _ => String::new(),
-        }
-    }
+/// What is said of a gain that a drift may have moved.
+fn other_gain(study: &Study, steady: &SteadyGain) -> Option<String> {
+    let gain = study.fit.model.dc_gain();
+    let (sigmas, share) = steady.apart(gain);
+    (sigmas > LIKELY_SIGMAS && share > LIKELY_SHARE).then(|| {
+        format!(
+            "the gain is {gain:.4}, but {:.4} ± {:.4} once a straight line in time is taken off \
+             input and output: the output drifts, and the model follows it in part",
+            steady.gain, steady.sigma
+        )
+    })
 }
 
 #[cfg(test)]

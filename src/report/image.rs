@@ -5,7 +5,7 @@ mod canvas;
 
 use image::imageops::FilterType;
 
-use super::run::palette::{GAUGE, LEFT_EDGE, REJECTED, RIGHT_EDGE, Rgb};
+use super::chart::palette::{GAUGE, LEFT_EDGE, REJECTED, RIGHT_EDGE, Rgb};
 use crate::core::frame::Frame;
 use crate::core::geometry::{ImagePoint, Roi};
 use crate::vision::{Edges, Gauge, WidthMeasurement};

@@ -1,9 +1,12 @@
 //! `summary.json`: what a run came to, in numbers.
 
+pub mod advice;
 mod control;
 mod distance;
 mod extruder;
 mod follow;
+mod image_quality;
+mod note;
 mod profile;
 
 use std::collections::BTreeMap;
@@ -18,11 +21,12 @@ use distance::DistanceTally;
 pub use extruder::ExtruderSummary;
 use extruder::ExtruderTally;
 pub use follow::Follower;
+pub use image_quality::HintSummary;
+pub use note::Note;
 pub use profile::ProfileSummary;
 
 use super::frame_row::FrameRow;
 use super::output::{LogError, write_whole};
-use super::setup;
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::{Span, Stamp};
@@ -71,27 +75,6 @@ pub struct Summary {
     /// What only a run has whose extruder is commanded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub extruder: Option<ExtruderSummary>,
-}
-
-/// Medians over the measured frames, within 0.14 %, for whoever sets up light
-/// and lens.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct HintSummary {
-    /// Step from ground to bead \[grey levels of 256\].
-    pub contrast_median_grey: Option<f64>,
-    /// Blur of the edges \[px\].
-    pub blur_median_px: Option<f64>,
-    /// Noise of a pixel \[grey levels of 256\].
-    pub noise_median_grey: Option<f64>,
-    /// Mean share of saturated pixels.
-    pub saturated_share_mean: Option<f64>,
-    /// Mean share of caliper lines in use.
-    pub used_share_mean: Option<f64>,
-    /// How far the skew of the edges' flanks moves widths: measured less true width in the
-    /// picture, the mean weighed by what each frame tells \[px\].
-    pub skew_offset_px: Option<f64>,
-    /// Its standard deviation \[px\].
-    pub skew_offset_sigma_px: Option<f64>,
 }
 
 /// Roughness of the bead, which no standard deviation of a width contains.
@@ -150,21 +133,6 @@ impl Summary {
         })?;
         write_whole(folder, "summary.json", &[text.as_slice(), b"\n"].concat())
     }
-}
-
-/// A fact that neither a frame nor a step tells.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Note {
-    /// A setpoint was written to the robot.
-    SetpointSent,
-    /// Frames that were never looked at, because a newer one was there.
-    FramesSuperseded(u64),
-    /// Frames that the recorder could not keep up with.
-    FramesDroppedByRecorder(u64),
-    /// Events or steps that could not be recorded.
-    RecordsLost(u64),
-    /// Something that the reader of the report should know, in words.
-    Remark(String),
 }
 
 /// Takes facts one at a time, in constant memory, and adds them up.
@@ -300,7 +268,7 @@ impl SummaryBuilder {
             width_std_mm: self.width.std(),
             sigma_mean_mm: self.sigma.mean(),
             roughness: self.roughness.map_or_else(Default::default, RoughnessSummary::of),
-            advice: setup::advice(&hints),
+            advice: advice::advice(&hints),
             hints,
             duration_s: self.first_s.zip(self.last_s).map(|(first, last)| last - first),
             target_width_mm: self.target.map(Mm::get),

@@ -1,4 +1,4 @@
-//! A log of an extruder whose truth is known, to try `identify` with nothing
+//! A log of an extruder whose truth is known, to try `extruder identify` with nothing
 //! attached.
 
 use rand::SeedableRng;

@@ -1,4 +1,4 @@
-//! Recordings of starts and stops, as `identify` is given them.
+//! Recordings of starts and stops, as `extruder identify` is given them.
 
 use std::fmt::Write as _;
 
@@ -54,7 +54,7 @@ pub fn record(machine: Machine, seed: u64, plan: &Recording) -> [Series; 2] {
     [command, flow]
 }
 
-/// The example of `identify`: 11 starts and stops in nine minutes.
+/// The example of `extruder identify`: 11 starts and stops in nine minutes.
 pub fn example() -> Recording {
     Recording {
         idle_s: vec![2.0, 30.0, 5.0, 120.0, 1.0, 15.0, 8.0, 60.0, 3.0, 0.5, 240.0],

@@ -8,7 +8,7 @@ use super::error::ReproduceError;
 use super::source::Source;
 use super::study::{Effort, Reproduced};
 use crate::io::progress::Progress;
-use crate::report::run::whole_page;
+use crate::report::html::whole_page;
 use summary::Summary;
 
 pub mod summary;

@@ -69,8 +69,8 @@ impl Bench {
         }
         let file = folder.path().join("extruder.toml");
         fs::write(&file, theirs).unwrap();
-        let robot = Machine::start(&["robot-sim", "--endless", "--pause-s", "0.3"]);
-        let mut args = vec!["extruder-sim", file.to_str().unwrap()];
+        let robot = Machine::start(&["sim", "robot", "--endless", "--pause-s", "0.3"]);
+        let mut args = vec!["sim", "extruder", file.to_str().unwrap()];
         args.extend(more);
         let extruder = Machine::start(&args);
         let cell = cell
@@ -240,7 +240,8 @@ fn refused(cell: &str, command: &str) -> String {
     let args: &[&str] = if command == "run" { &["--out", "out"] } else { &[] };
     let output = truebead()
         .current_dir(folder.path())
-        .args([command, "cell.toml"])
+        .args(command.split(' '))
+        .arg("cell.toml")
         .args(args)
         .output()
         .unwrap();
@@ -266,5 +267,5 @@ fn what_is_missing_or_wrong_in_a_cell_is_told_before_anything_moves() {
     let cut = CELL.find("[extruder]").unwrap();
     let end = CELL.find("[simulation]").unwrap();
     let none = CELL.replace(&CELL[cut..end], "");
-    assert!(refused(&none, "extruder-sim").contains("[extruder]: found nothing"));
+    assert!(refused(&none, "sim extruder").contains("[extruder]: found nothing"));
 }

@@ -1,4 +1,4 @@
-//! `truebead robot-sim` as it is typed.
+//! `truebead sim robot` as it is typed.
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
@@ -10,7 +10,7 @@ const PROGRAM: &str = env!("CARGO_BIN_EXE_truebead");
 #[test]
 fn it_says_where_it_listens_what_happens_and_ends_in_order() {
     let mut command = Command::new(PROGRAM);
-    command.args(["robot-sim", "--listen", "127.0.0.1:0", "--pause-s", "0", "--name", "tx"]);
+    command.args(["sim", "robot", "--listen", "127.0.0.1:0", "--pause-s", "0", "--name", "tx"]);
     let mut robot = command.stderr(Stdio::piped()).spawn().unwrap();
     let mut told = BufReader::new(robot.stderr.take().unwrap());
     let mut line = String::new();
@@ -35,7 +35,7 @@ fn it_says_where_it_listens_what_happens_and_ends_in_order() {
 #[test]
 fn what_cannot_be_is_refused_with_status_2_and_a_taken_address_with_1() {
     let run = |args: &[&str]| {
-        let output = Command::new(PROGRAM).arg("robot-sim").args(args).output().unwrap();
+        let output = Command::new(PROGRAM).args(["sim", "robot"]).args(args).output().unwrap();
         (output.status.code(), String::from_utf8(output.stderr).unwrap())
     };
     let (status, told) = run(&["--listen", "127.0.0.1:0", "--start", "200"]);

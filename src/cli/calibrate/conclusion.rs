@@ -1,11 +1,10 @@
 //! What the pictures of a board lead to: camera, bed plane, and what they leave open.
 
-use std::path::PathBuf;
-
 use anyhow::Context;
 
-use super::plane::{self, Plane};
-use super::{CalibrateArgs, Pictures, report};
+use super::arguments::CalibrateArgs;
+use super::pictures::Pictures;
+use super::{plane, report};
 use crate::calibration::board::Board;
 use crate::calibration::covariance::Covariance;
 use crate::calibration::map;
@@ -18,6 +17,7 @@ use crate::calibration::sighting::Sighting;
 use crate::calibration::solve;
 use crate::calibration::solve::Solution;
 use crate::calibration::{Calibration, Quality, file};
+use crate::cli::bed_plane::Plane;
 use crate::core::geometry::GridSize;
 use crate::core::units::Mm;
 use crate::io::whole_file::write_whole;
@@ -115,7 +115,7 @@ impl<'a> Conclusion<'a> {
         [
             report::lens(&self.solution),
             report::camera(&self.solution),
-            report::plane(&self.plane),
+            self.plane.text(),
             report::width(calibration, covariance, &self.maps),
             report::maps(&self.maps, self.args.max_width_sigma_mm),
             report::next_view(covariance, self.next.as_ref()),
@@ -187,16 +187,4 @@ impl<'a> Conclusion<'a> {
         let camera = solution.camera();
         file::to_toml(camera, &bed, solution.image_size_px, plane.robot_z, Some(quality), &[note])
     }
-}
-
-/// Names of files, without their folders.
-pub fn name_of(path: &std::path::Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
-}
-
-/// Pictures that a camera has taken so far, the first with the board on the bed.
-pub fn taken(files: &[PathBuf], kept: &[Sighting]) -> Pictures {
-    let looks = kept.iter().map(|sighting| (sighting.name.clone(), Ok(sighting.clone())));
-    let on_bed = files.first().cloned().into_iter().collect();
-    Pictures { files: files.to_vec(), looks: looks.collect(), on_bed }
 }

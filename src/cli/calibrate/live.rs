@@ -8,8 +8,9 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::conclusion::{Conclusion, taken};
-use super::{CalibrateArgs, Pictures, WrongArguments};
+use super::arguments::CalibrateArgs;
+use super::conclusion::Conclusion;
+use super::pictures::{Pictures, taken};
 use crate::calibration::board::Board;
 use crate::calibration::collect::{Collector, News};
 use crate::calibration::coverage::{Coverage, PARTS, SIDES};
@@ -17,6 +18,7 @@ use crate::calibration::quality;
 use crate::calibration::sighting;
 use crate::calibration::solve::FEWEST_VIEWS;
 use crate::cell::file::Source;
+use crate::cli::arguments::WrongArguments;
 use crate::core::frame::{Channel, Frame};
 use crate::core::time::Span;
 use crate::drivers::camera::open;
@@ -53,7 +55,7 @@ pub fn take(args: &CalibrateArgs, board: &Board) -> anyhow::Result<Pictures> {
     let is_folder_new = !folder.exists();
     std::fs::create_dir_all(&folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    let mut taking = Taking::new(args, board, (folder, is_folder_new));
+    let mut taking = Taking::new(args, board, folder, is_folder_new);
     let done = taking.run(camera.as_mut(), &stop);
     if taking.files.is_empty() {
         taking.clear();
@@ -111,7 +113,8 @@ impl<'a> Taking<'a> {
     fn new(
         args: &'a CalibrateArgs,
         board: &'a Board,
-        (folder, is_folder_new): (PathBuf, bool),
+        folder: PathBuf,
+        is_folder_new: bool,
     ) -> Self {
         Self {
             args,

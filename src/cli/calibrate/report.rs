@@ -2,9 +2,6 @@
 
 use std::fmt::Write;
 
-use nalgebra::{Point3, Vector3};
-
-use super::plane::Plane;
 use crate::calibration::Calibration;
 use crate::calibration::camera::NUMBERS;
 use crate::calibration::covariance::Covariance;
@@ -16,13 +13,6 @@ use crate::calibration::scale::single_scale;
 use crate::calibration::sighting::Looks;
 use crate::calibration::solve::{SHARED_NAMES, Solution};
 use crate::core::units::Mm;
-
-/// Adds a line to a text, which cannot fail.
-macro_rules! line {
-    ($out:ident $(, $($part:tt)*)?) => {{
-        let _ = writeln!($out $(, $($part)*)?);
-    }};
-}
 
 /// One line an image: corners and errors, or why it is not used.
 pub fn images(looks: &Looks, solution: &Solution) -> String {
@@ -131,50 +121,6 @@ pub fn camera(solution: &Solution) -> String {
         );
         line!(out, "  as large as that of independent corners");
     }
-    out
-}
-
-/// Where the bed is, and what was assumed about it.
-pub fn plane(plane: &Plane) -> String {
-    let mut out = String::new();
-    let how = if plane.assumed {
-        "assumed: the last that shows the board; --plane names another"
-    } else {
-        "as named"
-    };
-    let bed = plane.on_bed.bed(plane.thickness);
-    let height = bed.apply_inverse(Point3::origin()).z;
-    let up = bed.rotation() * Vector3::z();
-    let tilt_deg = (-up.z).clamp(-1.0, 1.0).acos().to_degrees();
-    line!(out, "\nbed plane");
-    line!(out, "  image       {} ({how})", plane.images.join(", "));
-    line!(out, "  corners     {:.3} px off (RMS)", plane.on_bed.rms_px);
-    if !plane.passed_over.is_empty() {
-        line!(
-            out,
-            "  WARNING     {} after it cannot be used: if the board lay on the bed there, take",
-            plane.passed_over.join(", ")
-        );
-        line!(out, "              that picture again, or name another with --plane");
-    }
-    if plane.images.len() > 1 {
-        line!(
-            out,
-            "  boards      {} on one plane, to {:.2} mm",
-            plane.images.len(),
-            plane.on_bed.off_mm
-        );
-    }
-    line!(
-        out,
-        "  board       its printed face lies {} above the bed (--board-thickness-mm)",
-        plane.thickness
-    );
-    line!(out, "  robot       z = {} when that image was taken (--robot-z-mm)", plane.robot_z);
-    line!(
-        out,
-        "  camera      {height:.1} mm above the bed, its view {tilt_deg:.1}° off straight down"
-    );
     out
 }
 

@@ -1,12 +1,13 @@
 //! What a plan takes from its cell.
 
-use super::PlanArgs;
-use super::job::{Bead, wrong};
+use super::arguments::PlanArgs;
+use super::bead::{Bead, wrong};
 use crate::assembly::extruder::Behaviour;
 use crate::assembly::{LoadedCell, extruder};
 use crate::cell::extruder::Strategy;
 use crate::cell::file::{ExtruderPart, Purpose, RunPart};
-use crate::cli::WrongArguments;
+use crate::cli::arguments::WrongArguments;
+use crate::cli::print::warn;
 use crate::extruder::CommandLimits;
 use crate::extruder::demand::section;
 use crate::identify::file as model;
@@ -19,13 +20,22 @@ use crate::report::planned::Facts;
 /// characterisation thesis.
 const CORRELATION_S: f64 = 0.15;
 
+/// A range of commands, in the unit of the drive.
+#[derive(Debug, Clone, Copy)]
+pub struct CommandRange {
+    /// Smallest.
+    pub min: f64,
+    /// Largest.
+    pub max: f64,
+}
+
 /// What a model was identified with.
 #[derive(Debug)]
 struct Identified {
     /// What messages call the model.
     source: String,
     /// Smallest and largest input.
-    range: (f64, f64),
+    range: CommandRange,
 }
 
 /// The cell as a plan sees it.
@@ -72,7 +82,7 @@ impl Extruder {
         };
         let mut warnings = Vec::new();
         let file = extruder::strategy_file(part, &name, &mut warnings)?;
-        crate::cli::warn(&warnings);
+        warn(&warnings);
         let behaviour = extruder::behaviour(keys, part, &name, file.as_ref())?;
         let identified = identified(file.as_ref())?;
         Self::of(args, (run, part), (name, identified), behaviour)
@@ -170,10 +180,12 @@ impl Extruder {
     }
 
     /// What is to be said of commands beyond what the model was identified with, if they are.
-    pub fn beyond(&self, (low, high): (f64, f64)) -> Option<String> {
-        let Identified { source, range: (least, most) } = self.identified.as_ref()?;
+    pub fn beyond(&self, planned: CommandRange) -> Option<String> {
+        let Identified { source, range } = self.identified.as_ref()?;
+        let (CommandRange { min: least, max: most }, CommandRange { min: low, max: high }) =
+            (*range, planned);
         let unit = self.facts.unit;
-        (low < *least || high > *most).then(|| {
+        (low < least || high > most).then(|| {
             format!(
                 "{source}: it was identified from {least} to {most} {unit}, and the plan has \
                  commands from {low:.4} to {high:.4} {unit}; what it says there is a guess"
@@ -185,5 +197,7 @@ impl Extruder {
 fn identified(file: Option<&ExtruderFile>) -> anyhow::Result<Option<Identified>> {
     let Some(file) = file else { return Ok(None) };
     let model = model::parse(&file.source, &file.text)?;
-    Ok(Some(Identified { source: file.source.clone(), range: model.input_range }))
+    let (min, max) = model.input_range;
+    let range = CommandRange { min, max };
+    Ok(Some(Identified { source: file.source.clone(), range }))
 }

@@ -1,31 +1,15 @@
 //! The beads of a job from its file.
 
 use std::fs;
-use std::path::Path;
 
+use super::arguments::{Ends, PlanArgs};
+use super::bead::{Bead, wrong};
 use super::cell::Extruder;
-use super::{Ends, PlanArgs};
-use crate::cli::WrongArguments;
-use crate::plan::{SpeedProfile, gcode, job};
+use crate::cli::arguments::WrongArguments;
+use crate::plan::{gcode, job};
 
 /// Endings of files with G-code.
 const GCODE: [&str; 3] = ["gcode", "nc", "g"];
-
-/// A bead before it is planned.
-#[derive(Debug)]
-pub struct Bead {
-    /// What it is called.
-    pub name: String,
-    /// Its nominal speed.
-    pub nominal: SpeedProfile,
-    /// Path and position \[mm\].
-    pub position: Vec<(f64, [f64; 3])>,
-}
-
-/// What is wrong with a job, with its file's name.
-pub fn wrong(job: &Path, what: &impl ToString) -> WrongArguments {
-    WrongArguments::new(format!("job {}: {}", job.display(), what.to_string()))
-}
 
 /// Reads a job by its ending.
 pub fn read(args: &PlanArgs, extruder: &Extruder) -> Result<Vec<Bead>, WrongArguments> {

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use anyhow::Context;
 
-use super::super::WrongArguments;
-use super::super::offset::recording::gauge;
-use super::super::recorded::attached;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
+use crate::cli::arguments::WrongArguments;
+use crate::cli::camera_offset::gauge;
+use crate::cli::recorded::attached;
 use crate::core::units::Mm;
 use crate::io::recording::{Entry, Recording};
 use crate::report::tuned::Tuned;

@@ -6,12 +6,14 @@ use std::process::ExitCode;
 use anyhow::Context;
 use toml_edit::{DocumentMut, value};
 
-use super::super::run::{self, Until};
-use super::super::simulate::SimRecorder;
-use super::super::{Voice, outcome};
-use super::TuneArgs;
+use super::arguments::TuneArgs;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
+use crate::cli::arguments::refuse_a_recording_in;
+use crate::cli::live_cell::{Folders, Until, live};
+use crate::cli::outcome;
+use crate::cli::print::Voice;
+use crate::cli::simulated_cell::{SimRecorder, simulated_extruder};
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::Stamp;
@@ -37,7 +39,7 @@ pub fn run(
     let loaded = derived(args, loaded)?;
     let steps = steps(&loaded)?;
     announce(args, &loaded, &steps, voice)?;
-    outcome::refuse_a_recording_in(&args.out)?;
+    refuse_a_recording_in(&args.out)?;
     output::make_folder(&args.out)?;
     let recording = args.out.join("recording.mcap");
     if args.simulated {
@@ -48,7 +50,14 @@ pub fn run(
     let until = Until { duration_s: None, ends_with_steps: true };
     let title = format!("Experiment on {}", args.cell.display());
     let log = args.out.join("run");
-    let report = run::live(loaded, (&args.out, &log), title, until, RunClock::start(), voice)?;
+    let report = live(
+        loaded,
+        Folders { recording: &args.out, log: &log },
+        title,
+        until,
+        RunClock::start(),
+        voice,
+    )?;
     let recording = report.recording.as_ref().map_or(recording, |whole| whole.path.clone());
     Ok((recording, outcome::status(&report, share)))
 }
@@ -129,7 +138,7 @@ fn announce(
 /// Lays the simulated bead until the camera has seen the last piece.
 fn simulate(out: &Path, loaded: &LoadedCell) -> anyhow::Result<()> {
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
-    let extruder = crate::cli::simulated_extruder(loaded)?;
+    let extruder = simulated_extruder(loaded)?;
     let recorder = SimRecorder::of(Some(&out.to_owned()), loaded)?;
     let calibration = loaded.calibration.clone();
     let mut sim = SimCell::with_extruder(&loaded.cell, &run, calibration, recorder, extruder)?;

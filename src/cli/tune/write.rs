@@ -5,12 +5,11 @@ use std::path::Path;
 use anyhow::Context;
 use toml_edit::{DocumentMut, Item, Value, value};
 
-use super::super::WrongArguments;
-use super::super::outcome::refuse_replacing;
-use super::Law;
+use super::arguments::Law;
 use super::experiment::OF_DISTANCE;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
+use crate::cli::arguments::{WrongArguments, refuse_replacing};
 use crate::io::whole_file::write_whole;
 use crate::report::tuned::Tuned;
 

@@ -79,7 +79,7 @@ pub enum ExperimentError {
     /// A column that does not move.
     #[error(
         "the {side} is {} all the time: nothing can be told from it{}",
-        short(*.value), if *.side == Side::Input { "; excite it (truebead excite writes profiles)" } else {
+        short(*.value), if *.side == Side::Input { "; excite it (truebead extruder excite writes profiles)" } else {
             "; see that its sensor is connected"
         }
     )]

@@ -122,7 +122,9 @@ fn constant_columns() {
     let [times, input, output] = columns();
     let still = vec![30.0; 1000];
     let said = refusal(&[times.clone(), still.clone(), output]);
-    assert!(said.contains("the input is 30 all the time") && said.contains("truebead excite"));
+    assert!(
+        said.contains("the input is 30 all the time") && said.contains("truebead extruder excite")
+    );
     let said = refusal(&[times, input, still]);
     assert!(said.contains("the output is 30 all the time") && said.contains("sensor"), "{said}");
 }

@@ -38,7 +38,7 @@ pub enum StartStopError {
     },
 }
 
-/// Parameters of starts and stops, which `identify` finds from recordings. They
+/// Parameters of starts and stops, which `extruder identify` finds from recordings. They
 /// hold for a material, a nozzle and a temperature (bcs-thesis, section 5.2).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StartStop {

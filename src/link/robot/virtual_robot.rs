@@ -1,5 +1,5 @@
 //! The robot's side of the link as a state machine. Time is an argument; one
-//! machine serves `robot-sim`, the simulated cell and the tests.
+//! machine serves `sim robot`, the simulated cell and the tests.
 //!
 //! ```text
 //!            begin_bead             setpoint runs out           1 s more

@@ -5,7 +5,7 @@ use maud::html;
 use super::drawing::share_map;
 use crate::calibration::share_map::ShareMap;
 use crate::core::geometry::Roi;
-use crate::report::run::whole_page;
+use crate::report::html::whole_page;
 
 /// What the page is made of.
 #[derive(Debug)]

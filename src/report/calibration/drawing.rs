@@ -6,7 +6,7 @@ use crate::calibration::map::{CELLS, Cells, WidthMap};
 use crate::calibration::share_map::ShareMap;
 use crate::calibration::solve::{Solution, View};
 use crate::numeric::rank;
-use crate::report::run::palette::{GAUGE, Ink, LEFT_EDGE, LIMIT, REJECTED, WIDTH};
+use crate::report::chart::palette::{GAUGE, Ink, LEFT_EDGE, LIMIT, REJECTED, WIDTH};
 
 /// Width of a drawing on the page [units of its own].
 const WIDE: f64 = 960.0;

@@ -2,16 +2,17 @@
 
 use maud::{Markup, html};
 
-use super::Study;
+use super::model::Study;
 use crate::core::quantity::Unit;
 use crate::identify::band::{self, Band};
 use crate::identify::experiment::Experiment;
-use crate::report::run::area::{Area, XAxis, round};
-use crate::report::run::axis::{Scale, with_margin};
-use crate::report::run::palette::{DEMAND, FLOW, Ink, MODEL, PRESSURE, SCREW, TARGET};
-use crate::report::run::plot::{Layer, Plot, y_range};
-use crate::report::run::sections::legend;
-use crate::report::run::series::Series;
+use crate::report::chart::area::{Area, XAxis, round};
+use crate::report::chart::axis::Scale;
+use crate::report::chart::legend::legend;
+use crate::report::chart::palette::{DEMAND, FLOW, Ink, MODEL, PRESSURE, SCREW, TARGET};
+use crate::report::chart::plot::{Layer, Plot, y_range};
+use crate::report::chart::range::Range;
+use crate::report::chart::series::Series;
 
 /// Points of a curve that a model gives.
 const POINTS: u32 = 400;
@@ -44,7 +45,7 @@ fn times(data: &Experiment) -> impl Iterator<Item = f64> {
 pub fn over_time(study: &Study, data: &Experiment, foretold: &[f64]) -> Markup {
     let logs = &study.logs;
     let end = data.start_s + data.duration_s();
-    let axis = XAxis::time((data.start_s, end));
+    let axis = XAxis::time(Range::new(data.start_s, end));
     let input = series(times(data), data.input.iter().copied());
     let output = series(times(data), data.output.iter().copied());
     let model = series(times(data), foretold.iter().copied());
@@ -81,7 +82,7 @@ pub fn residuals(study: &Study) -> Markup {
     let data = &study.logs.estimation;
     let left = series(times(data), study.fit.residuals.iter().copied());
     let title = format!("measured − model [{}]", study.logs.output.unit);
-    let axis = XAxis::time((data.start_s, data.start_s + data.duration_s()));
+    let axis = XAxis::time(Range::new(data.start_s, data.start_s + data.duration_s()));
     let plot = Plot {
         area: Area::wide(170.0),
         x: &axis,
@@ -102,7 +103,7 @@ pub fn autocorrelation(study: &Study) -> Markup {
     let bound = study.residuals.bound;
     let axis = XAxis {
         title: "lag [s]".to_owned(),
-        range: (0.0, at(lags.len().max(2) - 1)),
+        range: Range::new(0.0, at(lags.len().max(2) - 1)),
         divisor: 1.0,
     };
     let plot = Plot {
@@ -129,7 +130,7 @@ pub fn step(study: &Study) -> Markup {
     let title = format!("{} after a step of 1 {}", study.logs.output, study.logs.input.unit);
     let [low, value, high] = edges(&band);
     let gain = fit.model.dc_gain();
-    let axis = XAxis::time((0.0, end_s));
+    let axis = XAxis::time(Range::new(0.0, end_s));
     let plot = Plot {
         area: Area::wide(210.0),
         x: &axis,
@@ -179,11 +180,12 @@ fn frequencies(study: &Study) -> Vec<f64> {
 
 fn over_frequency(band: &Band, title: &str) -> Markup {
     let area = Area::half(230.0);
-    let ends = (band.at.first().copied().unwrap_or(0.1), band.at.last().copied().unwrap_or(1.0));
+    let lowest = band.at.first().copied().unwrap_or(0.1);
+    let ends = Range::new(lowest, band.at.last().copied().unwrap_or(1.0));
     let x = Scale::log(ends, area.across());
     let all = edges(band);
-    let range = all.iter().filter_map(Series::range).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-    let y = Scale::linear(with_margin(range.unwrap_or((0.0, 1.0)), 0.06), area.upwards());
+    let range = all.iter().filter_map(Series::range).reduce(Range::joined);
+    let y = Scale::linear(range.unwrap_or(Range::new(0.0, 1.0)).with_margin(0.06), area.upwards());
     let path = |times: f64, back: bool| -> String {
         let points = band.at.iter().zip(&band.value).zip(&band.sigma);
         let points = points.map(|((f, value), sigma)| {

@@ -1,6 +1,6 @@
 //! What a reader should know of a model before it is used.
 
-use super::{Logs, Study};
+use super::model::{Logs, Study};
 use crate::identify::experiment::Experiment;
 use crate::identify::fit::{DOMINATES, Fit, Note, Trend};
 use crate::identify::number::brief;

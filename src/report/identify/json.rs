@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Study, form};
+use super::model::{Study, form};
 use crate::identify::experiment::Experiment;
 use crate::identify::fit::{Quality, Row};
 

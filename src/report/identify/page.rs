@@ -2,11 +2,12 @@
 
 use maud::{Markup, html};
 
+use super::curves;
+use super::model::{Study, form};
 use super::table::{independent, significant, transfer};
-use super::{Study, curves, form};
-use crate::report::run::palette::MODEL;
-use crate::report::run::sections::legend;
-use crate::report::run::whole_page;
+use crate::report::chart::legend::legend;
+use crate::report::chart::palette::MODEL;
+use crate::report::html::whole_page;
 
 /// The page.
 pub fn page(study: &Study) -> String {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Study, form};
+use super::model::{Study, form};
 use crate::identify::fit::{Fit, Note, Row};
 
 /// Least width of the names of forms.

@@ -3,9 +3,11 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 use super::*;
-use crate::core::quantity::Unit;
+use crate::core::quantity::{Quantity, Unit};
 use crate::identify::experiment::Rules;
+use crate::identify::file::{self, Setting};
 use crate::identify::fit::DeadTime;
+use crate::identify::fit::Structure;
 use crate::sim::flow_log;
 use crate::sim::flow_log::Logged;
 

@@ -1,6 +1,6 @@
 //! Anti-aliased lines and dots on an RGB image.
 
-use crate::report::run::palette::Rgb;
+use crate::report::chart::palette::Rgb;
 
 type Place = (f64, f64);
 

@@ -5,13 +5,14 @@ use maud::{Markup, html};
 use super::verdict::verdict;
 use super::{Facts, PlannedBead, rms};
 use crate::plan::{Foretold, SpeedProfile};
-use crate::report::run::area::{Area, XAxis};
-use crate::report::run::legend::legend;
-use crate::report::run::palette;
-use crate::report::run::palette::Ink;
-use crate::report::run::plot::{Layer, Plot, y_range};
-use crate::report::run::series::Series;
-use crate::report::run::whole_page;
+use crate::report::chart::area::{Area, XAxis};
+use crate::report::chart::legend::legend;
+use crate::report::chart::palette;
+use crate::report::chart::palette::Ink;
+use crate::report::chart::plot::{Layer, Plot, y_range};
+use crate::report::chart::range::Range;
+use crate::report::chart::series::Series;
+use crate::report::html::whole_page;
 
 /// Beads that are drawn; of more, those with the largest errors.
 const DRAWN: usize = 12;
@@ -49,7 +50,7 @@ pub fn page(
 }
 
 fn section(bead: &PlannedBead, facts: &Facts) -> Markup {
-    let path = XAxis::path((bead.nominal.start_mm(), bead.nominal.end_mm()));
+    let path = XAxis::path(Range::new(bead.nominal.start_mm(), bead.nominal.end_mm()));
     let speed = &bead.plan.speed;
     let at_time = |of: &dyn Fn(f64) -> f64| along(speed, |path_mm| of(speed.time_at(path_mm)));
     let speeds = [

@@ -3,12 +3,12 @@
 
 use super::distance::DistanceCharts;
 use super::extruder::ExtruderCharts;
-use super::series::Series;
-use super::strip::{Mark, Strip};
 use crate::control::event::Event;
 use crate::control::step::{State, Step};
 use crate::core::time::Stamp;
 use crate::core::units::MmPerS;
+use crate::report::chart::series::Series;
+use crate::report::chart::strip::{Mark, Strip};
 use crate::rows::frame_row::FrameRow;
 use crate::rows::names;
 use crate::rows::summary::Follower;

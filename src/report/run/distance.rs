@@ -2,12 +2,12 @@
 
 use maud::{Markup, html};
 
-use super::area::{Area, XAxis};
-use super::legend;
-use super::palette;
-use super::plot::{Layer, Plot, y_range};
-use super::series::Series;
 use crate::control::step::Step;
+use crate::report::chart::area::{Area, XAxis};
+use crate::report::chart::legend;
+use crate::report::chart::palette;
+use crate::report::chart::plot::{Layer, Plot, y_range};
+use crate::report::chart::series::Series;
 use crate::rows::summary::DistanceSummary;
 
 /// What the plots are drawn from, over where the bead was laid.

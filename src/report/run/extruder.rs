@@ -3,20 +3,20 @@
 
 use maud::{Markup, html};
 
-use super::area::{Area, XAxis};
-use super::legend;
-use super::palette;
-use super::palette::Ink;
-use super::plot::{Layer, Plot, y_range};
-use super::series::Series;
-use super::strip::{Mark, Strip};
-use super::strips;
-use super::strips::Row;
 use crate::control::event::Event;
 use crate::control::step::Step;
 use crate::core::time::Stamp;
 use crate::core::units::Mm3PerS;
 use crate::extruder::{Drive, ExtruderReport, ExtruderState};
+use crate::report::chart::area::{Area, XAxis};
+use crate::report::chart::legend;
+use crate::report::chart::palette;
+use crate::report::chart::palette::Ink;
+use crate::report::chart::plot::{Layer, Plot, y_range};
+use crate::report::chart::series::Series;
+use crate::report::chart::strip::{Mark, Strip};
+use crate::report::chart::strips;
+use crate::report::chart::strips::Row;
 use crate::rows::names;
 use crate::rows::summary::ExtruderSummary;
 

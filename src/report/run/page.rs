@@ -1,7 +1,7 @@
 //! The page of a run, gathered while it goes on.
 
-use super::Report;
 use super::charts::Charts;
+use super::contents::Report;
 use crate::control::{Event, Step};
 use crate::core::frame::Frame;
 use crate::core::time::Stamp;

@@ -3,23 +3,25 @@
 use base64::Engine as _;
 use maud::{Markup, html};
 
-use super::Report;
-use super::area::{Area, XAxis};
 use super::charts::Twice;
-use super::legend;
-use super::palette;
-use super::palette::Ink;
-use super::plot::{Layer, Plot, y_range};
-use super::series::Series;
-use super::strip::Strip;
-use super::strips;
-use super::strips::Row;
-use super::{advice, histogram};
+use super::contents::Report;
+use super::remedies;
 use crate::numeric::statistics::as_f64;
-use crate::rows::setup;
+use crate::report::chart::area::{Area, XAxis};
+use crate::report::chart::histogram;
+use crate::report::chart::legend;
+use crate::report::chart::palette;
+use crate::report::chart::palette::Ink;
+use crate::report::chart::plot::{Layer, Plot, y_range};
+use crate::report::chart::range::Range;
+use crate::report::chart::series::Series;
+use crate::report::chart::strip::Strip;
+use crate::report::chart::strips;
+use crate::report::chart::strips::Row;
 use crate::rows::summary::Summary;
+use crate::rows::summary::advice;
 
-pub use super::legend::legend;
+use crate::report::chart::legend::legend;
 
 /// The states of the width controller.
 const STATES: [&str; 5] = ["idle", "priming", "tracking", "holding", "fault"];
@@ -70,7 +72,7 @@ fn width_plot(report: &Report<'_>, axis: &XAxis, pick: fn(&Twice) -> &Series) ->
     let charts = report.charts;
     let width = pick(&charts.width);
     let course = pick(&charts.target);
-    let varies = course.range().is_some_and(|(low, high)| high - low > 1e-6);
+    let varies = course.range().is_some_and(|range| range.length() > 1e-6);
     let target = report.summary.target_width_mm.filter(|_| !varies);
     let values: Vec<f64> = target.into_iter().collect();
     let name = target.map(|target| format!("{target} mm")).unwrap_or_default();
@@ -152,7 +154,7 @@ pub fn rejections(report: &Report<'_>) -> Markup {
                         th { "what it means" } th { "what to do" }
                     } }
                     tbody { @for (status, count) in rejected {
-                        @let (meaning, remedy) = advice::on(status);
+                        @let (meaning, remedy) = remedies::of(status);
                         tr {
                             td { code { (status) } }
                             td.number { (count) }
@@ -197,18 +199,18 @@ pub fn hints(report: &Report<'_>) -> Markup {
     let charts = report.charts;
     let Some(range) = charts.contrast.extent() else { return html! {} };
     // Widths that were simulated without a picture have no hints.
-    if charts.contrast.range().is_none_or(|(_, most)| most <= 0.0) {
+    if charts.contrast.range().is_none_or(|range| range.max <= 0.0) {
         return html! {};
     }
     let axis = if charts.timed == Some(true) { XAxis::time(range) } else { XAxis::frames(range) };
     // A steady hint is drawn as steady, not as its last digits.
     let small = |series: &Series, least_top: f64, y_title: &str| {
-        let (low, high) = y_range(&[series], &[0.0]);
+        let range = y_range(&[series], &[0.0]);
         Plot {
             area: Area::half(190.0),
             x: &axis,
             y_title,
-            y_range: (low.max(0.0), high.max(least_top)),
+            y_range: Range::new(range.min.max(0.0), range.max.max(least_top)),
             layers: vec![Layer::Curve(series, palette::WIDTH)],
         }
         .draw()
@@ -233,7 +235,7 @@ pub fn hints(report: &Report<'_>) -> Markup {
 
 /// What could be better about light and lens.
 fn improvements(summary: &Summary) -> Markup {
-    let bound = setup::row_bound_px(&summary.hints);
+    let bound = advice::row_bound_px(&summary.hints);
     html! {
         @if !summary.advice.is_empty() {
             ul.advice { @for sentence in &summary.advice { li { (sentence) } } }
@@ -270,10 +272,10 @@ fn limit(name: &str) -> Option<Ink> {
     (name != "none").then_some(palette::LIMIT)
 }
 
-fn strip_extent(strip: &Strip) -> Option<(f64, f64)> {
-    Some((strip.spells().first()?.from, strip.spells().last()?.to))
+fn strip_extent(strip: &Strip) -> Option<Range> {
+    Some(Range::new(strip.spells().first()?.from, strip.spells().last()?.to))
 }
 
-fn spanned(extents: impl Iterator<Item = Option<(f64, f64)>>) -> Option<(f64, f64)> {
-    extents.flatten().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+fn spanned(extents: impl Iterator<Item = Option<Range>>) -> Option<Range> {
+    extents.flatten().reduce(Range::joined)
 }

@@ -1,5 +1,5 @@
-use crate::report::run::*;
 use crate::report::synthetic;
+use crate::rows::summary::Summary;
 
 /// Where a person wants to look at the pages: a folder in this variable keeps
 /// them.

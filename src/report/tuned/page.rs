@@ -5,13 +5,15 @@ use maud::{Markup, html};
 use super::Tuned;
 use super::text::margin_words;
 use crate::identify::camera_offset::Seen;
-use crate::report::run::area::{Area, XAxis};
-use crate::report::run::legend::legend;
-use crate::report::run::palette::{CONTENDERS, Ink, LIMIT, MODEL, SETPOINT, SPEED, TARGET, WIDTH};
-use crate::report::run::plot::{Layer, Plot, y_range};
-use crate::report::run::series::Series;
-use crate::report::run::series::series;
-use crate::report::run::whole_page;
+use crate::report::chart::area::{Area, XAxis};
+use crate::report::chart::legend::legend;
+use crate::report::chart::palette::{
+    CONTENDERS, Ink, LIMIT, MODEL, SETPOINT, SPEED, TARGET, WIDTH,
+};
+use crate::report::chart::plot::{Layer, Plot, y_range};
+use crate::report::chart::series::Series;
+
+use crate::report::html::whole_page;
 use crate::tune::predict::{FLOW_STEP, Prediction, SEEDS};
 
 /// Time of the robot's answer that is shown about its steps \[s\].
@@ -84,9 +86,7 @@ impl Tuned {
         let study = &self.plant.study;
         let seen = |of: &dyn Fn(&Seen) -> f64| {
             let offset = self.plant.offset_mm.value;
-            let points: Vec<_> =
-                study.seen.iter().map(|seen| (seen.path_mm - offset, of(seen))).collect();
-            series(&points)
+            study.seen.iter().map(|seen| (seen.path_mm - offset, of(seen))).collect::<Series>()
         };
         let widths = seen(&|seen| seen.ln_width.exp());
         let model = seen(&|seen| (seen.ln_width - study.left(seen)).exp());
@@ -118,11 +118,10 @@ impl Tuned {
         let from = begin.secs();
         let within = |at: f64| (from..from + SHOWN_S).contains(&at);
         let told = self.log.setpoints.iter().map(|(at, speed)| (at.secs(), speed.get()));
-        let told: Vec<_> = told.filter(|(at, _)| within(*at)).collect();
+        let told: Series = told.filter(|(at, _)| within(*at)).collect();
         let reported = self.log.states.iter();
         let reported = reported.map(|(at, state)| (at.secs(), state.speed_mm_per_s.get()));
-        let reported: Vec<_> = reported.filter(|(at, _)| within(*at)).collect();
-        let (told, reported) = (series(&told), series(&reported));
+        let reported: Series = reported.filter(|(at, _)| within(*at)).collect();
         let Some(range) = told.extent() else { return html! {} };
         let axis = XAxis::time(range);
         html! {
@@ -166,8 +165,10 @@ impl Tuned {
     }
 
     fn foretold(&self) -> Markup {
-        let beads: Vec<Series> = self.predictions.iter().map(|one| series(&one.bead)).collect();
-        let speeds: Vec<Series> = self.predictions.iter().map(|one| series(&one.speed)).collect();
+        let beads: Vec<Series> =
+            self.predictions.iter().map(|one| one.bead.iter().copied().collect()).collect();
+        let speeds: Vec<Series> =
+            self.predictions.iter().map(|one| one.speed.iter().copied().collect()).collect();
         let Some(range) = beads.iter().find_map(Series::extent) else { return html! {} };
         let axis = XAxis::path(range);
         let names: Vec<_> = self

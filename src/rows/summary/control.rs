@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::Note;
 use super::follow::{Follower, Lapse};
+use super::note::Note;
 use crate::control::event::Event;
 use crate::control::step::{State, Step};
 use crate::core::time::{Span, Stamp};

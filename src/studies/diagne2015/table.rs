@@ -10,13 +10,13 @@ use crate::extruder::screw::control::Scheme;
 use crate::extruder::screw::feasible::Feasibility;
 use crate::extruder::screw::{FillLaw, Screw, TurnUnit};
 use crate::io::progress::Progress;
-use crate::report::run::area::{Area, XAxis};
-use crate::report::run::palette;
-use crate::report::run::palette::Ink;
-use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
-use crate::report::run::sections::legend;
-use crate::report::run::series::Series;
-use crate::report::run::series::series;
+use crate::report::chart::area::{Area, XAxis};
+use crate::report::chart::legend::legend;
+use crate::report::chart::palette;
+use crate::report::chart::palette::Ink;
+use crate::report::chart::plot::{Layer as Drawn, Plot, y_range};
+use crate::report::chart::range::Range;
+use crate::report::chart::series::Series;
 use crate::studies::error::ReproduceError;
 use crate::studies::row::Rows;
 use crate::studies::source::Source;
@@ -25,8 +25,8 @@ use crate::studies::study::{Reproduced, Section};
 /// What progress is told of.
 pub const EXPERIMENTS: u64 = 4;
 /// How much of a run is drawn: until all predictors have settled, and all \[s\].
-const BEGINNING: (f64, f64) = (0.0, 3.0);
-const ALL: (f64, f64) = (0.0, 60.0);
+const BEGINNING: Range = Range::new(0.0, 3.0);
+const ALL: Range = Range::new(0.0, 60.0);
 const ABOUT: &str = "The paper prints curves and no numbers of them, so that nothing stands under \
     published. Simulated: plant, delay and predictor in the paper's scheme, Euler steps of 1 ms. \
     Ours: the predictor of high order on a plant that is integrated to high order; where a law is \
@@ -224,7 +224,7 @@ fn names(lines: &[&Line<'_>]) -> Markup {
 
 fn draw(
     lines: &[&Line<'_>],
-    range: (f64, f64),
+    range: Range,
     (y_title, of): (&str, Of),
     level: Option<f64>,
 ) -> Markup {
@@ -241,17 +241,17 @@ fn draw(
     Plot { area: Area::wide(200.0), x: &axis, y_title, y_range, layers }.draw()
 }
 
-fn during(course: &Course, (from, to): (f64, f64), of: Of) -> Series {
-    let inside = course.samples.iter().filter(|sample| (from..=to).contains(&sample.at_s));
-    series(&inside.map(|sample| (sample.at_s, of(sample))).collect::<Vec<_>>())
+fn during(course: &Course, range: Range, of: Of) -> Series {
+    let inside =
+        course.samples.iter().filter(|sample| (range.min..=range.max).contains(&sample.at_s));
+    inside.map(|sample| (sample.at_s, of(sample))).collect()
 }
 
 /// What was foretold, at the moment for which it was, beside what came.
 fn draw_foretold(found: &Examined) -> Markup {
     let course = &found.informed.exact;
     let until = |points: Vec<(f64, f64)>| {
-        let early = points.into_iter().filter(|(at_s, _)| *at_s <= BEGINNING.1);
-        series(&early.collect::<Vec<_>>())
+        points.into_iter().filter(|(at_s, _)| *at_s <= BEGINNING.max).collect::<Series>()
     };
     let foretold = course.samples.iter().filter_map(|s| s.foretold.map(|(mm, at_s)| (at_s, mm)));
     let foretold = until(foretold.collect());
@@ -286,7 +286,7 @@ fn draw_misses(found: &Examined) -> Markup {
         let late = course.samples.get(first..).unwrap_or_default();
         let pairs = late.iter().zip(&found.oracle);
         let points = pairs.map(|(sample, (at_s, plug))| (*at_s, sample.plug_mm - plug));
-        series(&points.filter(|(at_s, _)| *at_s <= BEGINNING.1).collect::<Vec<_>>())
+        points.filter(|(at_s, _)| *at_s <= BEGINNING.max).collect::<Series>()
     };
     let (paper, exact) = (miss(&found.informed.paper), miss(&found.informed.exact));
     let axis = XAxis::time(BEGINNING);

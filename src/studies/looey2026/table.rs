@@ -5,13 +5,13 @@ use maud::{Markup, html};
 use super::strand::Parameters;
 use super::{Case, Experiment, Method, Moment, RAMPS_PER_S, SubSystem, TABLE};
 use crate::io::progress::Progress;
-use crate::report::run::area::{Area, XAxis};
-use crate::report::run::palette;
-use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
-use crate::report::run::sections::legend;
-use crate::report::run::series::Series;
-use crate::report::run::series::series;
+use crate::report::chart::area::{Area, XAxis};
+use crate::report::chart::legend::legend;
+use crate::report::chart::palette;
+use crate::report::chart::plot::{Layer as Drawn, Plot, y_range};
+use crate::report::chart::series::Series;
 use crate::studies::error::ReproduceError;
+
 use crate::studies::looey2026 as experiments;
 use crate::studies::row::Rows;
 use crate::studies::source::Source;
@@ -170,9 +170,9 @@ impl Study {
     fn draw(&self, [fixed, paper, ours]: &[Course; 3]) -> Markup {
         let (speed, unit) = [("v̄1 [mm/s]", "Δ1 [g/s]"), ("ū3 [mm/s]", "Δ3 [mm/s]")][self.part];
         let pick = |of: fn(&Course) -> &Vec<(f64, f64)>| {
-            [fixed, paper, ours].map(|course| series(of(course)))
+            [fixed, paper, ours].map(|course| of(course).iter().copied().collect::<Series>())
         };
-        let truth = series(&fixed.unknown);
+        let truth: Series = fixed.unknown.iter().copied().collect();
         let error = ["e1 [mm/s]", "e3 [mm/s]"][self.part];
         html! {
             (legend(&[

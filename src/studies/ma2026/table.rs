@@ -9,8 +9,9 @@ use crate::core::units::{Mm, MmPerS};
 use crate::extruder::demand;
 use crate::extruder::rheology::PowerLaw;
 use crate::io::progress::Progress;
-use crate::report::run::palette;
-use crate::report::run::palette::Ink;
+use crate::report::chart::palette;
+use crate::report::chart::palette::Ink;
+use crate::report::chart::range::Range;
 use crate::studies::error::ReproduceError;
 use crate::studies::row::Rows;
 use crate::studies::source::Source;
@@ -92,7 +93,7 @@ impl Work {
         Ok(Some(Section {
             heading: "Step of the target".to_owned(),
             hint: "From rest to 0.6 MPa, without noise.".to_owned(),
-            drawing: courses(&drawn, 0.0..5.0),
+            drawing: courses(&drawn, Range::new(0.0, 5.0)),
         }))
     }
 
@@ -152,8 +153,8 @@ impl Work {
                    the robot's path tells it."
                 .to_owned(),
             drawing: html! {
-                (courses(&drawn, 20.0..60.0))
-                (curves(&drawn, 20.0..60.0, "error [kPa]", |course, at| {
+                (courses(&drawn, Range::new(20.0, 60.0)))
+                (curves(&drawn, Range::new(20.0, 60.0), "error [kPa]", |course, at| {
                     let pressure = course.pressure.get(at)?;
                     Some((pressure - course.target.get(at)?) * KPA)
                 }))
@@ -193,7 +194,7 @@ impl Work {
                    noise for a step of the load once in some 20 s, and takes it back within a \
                    second: the price of its quick answer to a true one."
                 .to_owned(),
-            drawing: courses(&drawn, 20.0..120.0),
+            drawing: courses(&drawn, Range::new(20.0, 120.0)),
         }))
     }
 
@@ -227,7 +228,7 @@ impl Work {
             hint: "0.1 at the plant's input after 5 s, without noise. No law can keep the error \
                    below 0.386 of it: the correction comes a dead time late."
                 .to_owned(),
-            drawing: courses(&drawn, 4.0..12.0),
+            drawing: courses(&drawn, Range::new(4.0, 12.0)),
         }))
     }
 

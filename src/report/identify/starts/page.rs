@@ -5,19 +5,20 @@ use maud::{Markup, html};
 use super::StartStudy;
 use crate::identify::series::Series as Logged;
 use crate::identify::start_stop::file::{Named, START, STOP};
+use crate::report::chart::area::{Area, XAxis};
+use crate::report::chart::legend::legend;
+use crate::report::chart::palette::{DEMAND, FLOW, MODEL, SCREW};
+use crate::report::chart::pauses::{Drawn, over_pauses};
+use crate::report::chart::plot::{Layer, Plot, y_range};
+use crate::report::chart::range::Range;
+use crate::report::chart::series::Series;
+use crate::report::html::whole_page;
 use crate::report::identify::table::significant;
-use crate::report::run::area::{Area, XAxis};
-use crate::report::run::legend::legend;
-use crate::report::run::palette::{DEMAND, FLOW, MODEL, SCREW};
-use crate::report::run::pauses::{Drawn, over_pauses};
-use crate::report::run::plot::{Layer, Plot, y_range};
-use crate::report::run::series::Series;
-use crate::report::run::whole_page;
 
 /// Points of a curve that the model gives.
 const POINTS: u32 = 300;
 /// A start is shown from this before its first flow on, until that after it \[s\].
-const ABOUT_FIRST_FLOW_S: (f64, f64) = (-0.5, 3.0);
+const ABOUT_FIRST_FLOW_S: Range = Range::new(-0.5, 3.0);
 
 /// The page.
 pub fn page(study: &StartStudy) -> String {
@@ -114,11 +115,13 @@ fn stops(study: &StartStudy) -> Markup {
     let seen = &study.fit.stops;
     let all: Vec<Series> = seen
         .iter()
-        .map(|stop| share(&study.logs.flow, stop.at_s, (0.0, stop.seen_s), stop.flow_mm3_per_s))
+        .map(|stop| {
+            share(&study.logs.flow, stop.at_s, Range::new(0.0, stop.seen_s), stop.flow_mm3_per_s)
+        })
         .collect();
     let longest_s = seen.iter().map(|stop| stop.seen_s).fold(0.0, f64::max);
-    let model = curve((0.0, longest_s), |since_s| study.fit.parameters.falling(since_s));
-    laid_over("time since the command to stop [s]", (0.0, longest_s), &all, &model)
+    let model = curve(Range::new(0.0, longest_s), |since_s| study.fit.parameters.falling(since_s));
+    laid_over("time since the command to stop [s]", Range::new(0.0, longest_s), &all, &model)
 }
 
 fn starts(study: &StartStudy) -> Markup {
@@ -136,8 +139,8 @@ fn starts(study: &StartStudy) -> Markup {
 }
 
 /// The flow over another, from a moment on.
-fn share(flow: &Logged, at_s: f64, (from_s, to_s): (f64, f64), even: f64) -> Series {
-    let part = flow.within(at_s + from_s, at_s + to_s);
+fn share(flow: &Logged, at_s: f64, range: Range, even: f64) -> Series {
+    let part = flow.within(at_s + range.min, at_s + range.max);
     let mut series = Series::default();
     for (time_s, value) in part.time_s.iter().zip(&part.values) {
         series.push(time_s - at_s, value / even);
@@ -145,16 +148,16 @@ fn share(flow: &Logged, at_s: f64, (from_s, to_s): (f64, f64), even: f64) -> Ser
     series
 }
 
-fn curve((from_s, to_s): (f64, f64), of: impl Fn(f64) -> f64) -> Series {
+fn curve(range: Range, of: impl Fn(f64) -> f64) -> Series {
     let mut series = Series::default();
     for k in 0..=POINTS {
-        let at_s = from_s + (to_s - from_s) * f64::from(k) / f64::from(POINTS);
+        let at_s = range.min + range.length() * f64::from(k) / f64::from(POINTS);
         series.push(at_s, of(at_s));
     }
     series
 }
 
-fn laid_over(title: &str, range: (f64, f64), all: &[Series], model: &Series) -> Markup {
+fn laid_over(title: &str, range: Range, all: &[Series], model: &Series) -> Markup {
     let axis = XAxis { title: title.to_owned(), range, divisor: 1.0 };
     let shown: Vec<&Series> = all.iter().chain([model]).collect();
     let layers = all.iter().map(|one| Layer::Data(one, FLOW)).chain([Layer::Curve(model, MODEL)]);
@@ -172,7 +175,7 @@ fn laid_over(title: &str, range: (f64, f64), all: &[Series], model: &Series) -> 
 fn record(study: &StartStudy) -> Markup {
     let logs = &study.logs;
     let ends = (logs.flow.time_s.first().copied(), logs.flow.time_s.last().copied());
-    let axis = XAxis::time((ends.0.unwrap_or(0.0), ends.1.unwrap_or(1.0)));
+    let axis = XAxis::time(Range::new(ends.0.unwrap_or(0.0), ends.1.unwrap_or(1.0)));
     let drawn = |logged: &Logged| {
         let mut series = Series::default();
         logged.time_s.iter().zip(&logged.values).for_each(|(x, y)| series.push(*x, *y));

@@ -3,19 +3,20 @@
 use maud::{Markup, html};
 
 use super::around::Around;
-use crate::report::run::area::{Area, XAxis};
-use crate::report::run::palette;
-use crate::report::run::palette::Ink;
-use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
-use crate::report::run::sections::legend;
-use crate::report::run::series::series;
+use crate::report::chart::area::{Area, XAxis};
+use crate::report::chart::legend::legend;
+use crate::report::chart::palette;
+use crate::report::chart::palette::Ink;
+use crate::report::chart::plot::{Layer as Drawn, Plot, y_range};
+use crate::report::chart::range::Range;
+use crate::report::chart::series::Series;
 use crate::studies::bcs_thesis as plant;
 use crate::studies::bcs_thesis::corner::{BEAD, Drive, JUDGED_MM, Row};
 use crate::studies::bcs_thesis::fit_table::{FitRow, FitTable};
 use crate::studies::bcs_thesis::on_off::{Compared, Run};
 
 /// What is drawn once more, more closely \[s\].
-const CLOSER_S: (f64, f64) = (40.0, 60.0);
+const CLOSER_S: Range = Range::new(40.0, 60.0);
 
 /// What a camera some way behind the nozzle brings.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,7 +31,8 @@ pub struct CameraGain {
 type Curve<'a> = (&'a [(f64, f64)], &'static str, Ink);
 
 fn plot(y_title: &str, axis: &XAxis, curves: &[Curve<'_>], level: Option<f64>) -> Markup {
-    let drawn: Vec<_> = curves.iter().map(|(points, ..)| series(points)).collect();
+    let drawn: Vec<Series> =
+        curves.iter().map(|(points, ..)| points.iter().copied().collect()).collect();
     let shown: Vec<_> = drawn.iter().collect();
     let levels: Vec<f64> = level.into_iter().collect();
     let mut layers: Vec<Drawn<'_>> =
@@ -51,7 +53,7 @@ pub fn fits(table: &FitTable) -> Markup {
         table.example.iter().map(|row| (row[0], row[which])).collect()
     };
     let (measured, predicted) = (of(1), of(2));
-    let axis = XAxis::time((0.0, measured.last().map_or(1.0, |(t, _)| *t)));
+    let axis = XAxis::time(Range::new(0.0, measured.last().map_or(1.0, |(t, _)| *t)));
     let flows = [
         (measured.as_slice(), "simulated with what no model tells", palette::FLOW),
         (predicted.as_slice(), "fitted model", palette::MODEL),
@@ -71,7 +73,7 @@ pub fn fits(table: &FitTable) -> Markup {
         .collect();
     let title = format!("poles,zeros – {}", names.join("   "));
     #[expect(clippy::cast_precision_loss, reason = "eight models")]
-    let range = (1.0, table.rows.len() as f64);
+    let range = Range::new(1.0, table.rows.len() as f64);
     html! {
         (plot("flow about its mean [mm³/s]", &axis, &flows, None))
         (plot("fit [%]", &XAxis { title, range, divisor: 1.0 }, &fits, None))
@@ -91,7 +93,11 @@ pub fn runs(thesis: &Compared, ours: &Compared) -> Markup {
         ]
     };
     let near = |run: &Run| -> Vec<(f64, f64)> {
-        run.area.iter().copied().filter(|(t, _)| (CLOSER_S.0..=CLOSER_S.1).contains(t)).collect()
+        run.area
+            .iter()
+            .copied()
+            .filter(|(t, _)| (CLOSER_S.min..=CLOSER_S.max).contains(t))
+            .collect()
     };
     let (theirs, best_near) = (near(on), near(best));
     let closer = [
@@ -122,17 +128,18 @@ pub fn exact([thesis, ours]: &[Compared; 2]) -> Markup {
         (theirs.as_slice(), "the thesis' controller", palette::PAPER),
         (best.as_slice(), "ours", palette::OURS),
     ];
-    let axis = XAxis::time((plant::on_off::JUDGED_FROM_S, time(&thesis.example[0]).range.1));
+    let axis =
+        XAxis::time(Range::new(plant::on_off::JUDGED_FROM_S, time(&thesis.example[0]).range.max));
     plot("section − 45 [mm²]", &axis, &curves, None)
 }
 
 fn time(run: &Run) -> XAxis {
-    XAxis::time((0.0, run.area.last().map_or(1.0, |(t, _)| *t)))
+    XAxis::time(Range::new(0.0, run.area.last().map_or(1.0, |(t, _)| *t)))
 }
 
 /// What a camera can do, beside its bound.
 pub fn sensing(found: &[CameraGain], bound: &[CameraGain]) -> Markup {
-    let range = (0.0, bound.last().map_or(1.0, |gain| gain.behind_mm));
+    let range = Range::new(0.0, bound.last().map_or(1.0, |gain| gain.behind_mm));
     let points = |gains: &[CameraGain]| -> Vec<(f64, f64)> {
         gains.iter().map(|gain| (gain.behind_mm, gain.ratio)).collect()
     };
@@ -156,9 +163,9 @@ pub fn corner(rows: &[Row], runs: &[Around; 3]) -> Markup {
         (constant.as_slice(), "a constant extruder over ours", palette::PAPER),
         (proportional.as_slice(), "a proportional extruder over ours", palette::DEMAND),
     ];
-    let range = (0.0, rows.last().map_or(1.0, |row| row.budget_s));
+    let range = Range::new(0.0, rows.last().map_or(1.0, |row| row.budget_s));
     let time = XAxis { title: "time that may be added [s]".to_owned(), range, divisor: 1.0 };
-    let path = XAxis::path((-JUDGED_MM, JUDGED_MM));
+    let path = XAxis::path(Range::new(-JUDGED_MM, JUDGED_MM));
     let inks = [palette::PAPER, palette::DEMAND, palette::OURS];
     let over = |pick: fn(&Around) -> &[(f64, f64)]| -> Vec<Curve<'_>> {
         runs.iter().zip(inks).map(|(run, ink)| (pick(run), run.name, ink)).collect()

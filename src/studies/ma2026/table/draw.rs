@@ -1,16 +1,15 @@
 //! The curves of Ma et al. 2026 beside ours.
 
-use std::ops::Range;
-
 use maud::{Markup, html};
 
-use crate::report::run::area::{Area, XAxis};
-use crate::report::run::palette;
-use crate::report::run::palette::Ink;
-use crate::report::run::plot::{Layer as Drawn, Plot, y_range};
-use crate::report::run::sections::legend;
-use crate::report::run::series::Series;
-use crate::report::run::series::series;
+use crate::report::chart::area::{Area, XAxis};
+use crate::report::chart::legend::legend;
+use crate::report::chart::palette;
+use crate::report::chart::palette::Ink;
+use crate::report::chart::plot::{Layer as Drawn, Plot, y_range};
+use crate::report::chart::range::Range;
+use crate::report::chart::series::Series;
+
 use crate::studies::ma2026::{Course, Factors};
 
 /// Ticks from point to point of a drawing.
@@ -20,27 +19,27 @@ const DRAWN_EVERY: usize = 4;
 pub type Named = (&'static str, Ink, Course);
 
 /// Pressure and screw speed of some laws, with the target.
-pub fn courses(drawn: &[Named], range_s: Range<f64>) -> Markup {
+pub fn courses(drawn: &[Named], range: Range) -> Markup {
     html! {
-        (curves(drawn, range_s.clone(), "pressure [MPa]", |course, at| course.pressure.get(at).copied()))
-        (curves(drawn, range_s, "screw speed [rpm]", |course, at| course.speed.get(at).copied()))
+        (curves(drawn, range, "pressure [MPa]", |course, at| course.pressure.get(at).copied()))
+        (curves(drawn, range, "screw speed [rpm]", |course, at| course.speed.get(at).copied()))
     }
 }
 
 /// One quantity of some laws; with the pressure the target, too.
 pub fn curves(
     drawn: &[Named],
-    range_s: Range<f64>,
+    range: Range,
     y_title: &str,
     value: impl Fn(&Course, usize) -> Option<f64>,
 ) -> Markup {
     let all: Vec<Series> =
-        drawn.iter().map(|(_, _, course)| thinned(course, &range_s, &value)).collect();
+        drawn.iter().map(|(_, _, course)| thinned(course, range, &value)).collect();
     let target = drawn.first().map(|(_, _, course)| {
-        thinned(course, &range_s, &|course: &Course, at| course.target.get(at).copied())
+        thinned(course, range, &|course: &Course, at| course.target.get(at).copied())
     });
     let target = target.filter(|_| y_title.starts_with("pressure"));
-    let axis = XAxis::time((range_s.start, range_s.end));
+    let axis = XAxis::time(range);
     let mut shown: Vec<&Series> = all.iter().collect();
     let mut layers = Vec::new();
     let mut names: Vec<(&str, Ink, &str)> = Vec::new();
@@ -77,21 +76,20 @@ pub fn singles(drawn: &[Course]) -> Markup {
         .zip(drawn)
         .map(|(((name, _), ink), course)| (name, ink, course.clone()))
         .collect();
-    courses(&named, 0.0..5.0)
+    courses(&named, Range::new(0.0, 5.0))
 }
 
 fn thinned(
     course: &Course,
-    range_s: &Range<f64>,
+    range: Range,
     value: &impl Fn(&Course, usize) -> Option<f64>,
 ) -> Series {
-    let points: Vec<(f64, f64)> = course
+    course
         .time_s
         .iter()
         .enumerate()
         .step_by(DRAWN_EVERY)
-        .filter(|(_, t)| (range_s.start..=range_s.end).contains(*t))
+        .filter(|(_, t)| (range.min..=range.max).contains(*t))
         .filter_map(|(at, t)| value(course, at).map(|value| (*t, value)))
-        .collect();
-    series(&points)
+        .collect()
 }

@@ -2,12 +2,13 @@
 
 use maud::{Markup, html};
 
-use crate::report::run::area::{Area, XAxis};
-use crate::report::run::legend::legend;
-use crate::report::run::palette::{DEMAND, FLOW, Ink, OURS, PAPER, SETPOINT, SPEED};
-use crate::report::run::pauses::{Drawn, over_pauses};
-use crate::report::run::plot::{Layer, Plot, y_range};
-use crate::report::run::series::series;
+use crate::report::chart::area::{Area, XAxis};
+use crate::report::chart::legend::legend;
+use crate::report::chart::palette::{DEMAND, FLOW, Ink, OURS, PAPER, SETPOINT, SPEED};
+use crate::report::chart::pauses::{Drawn, over_pauses};
+use crate::report::chart::plot::{Layer, Plot, y_range};
+use crate::report::chart::range::Range;
+use crate::report::chart::series::Series;
 use crate::studies::bcs_thesis::start_stop::bench::{IDLE_S, Moment, Score};
 use crate::studies::bcs_thesis::start_stop::experiment::{Found, Losses, WATCHED_IDLE_S, bench};
 
@@ -75,10 +76,11 @@ fn shown(moments: &[Moment], of: impl Fn(&Moment) -> f64) -> Points {
 fn plot(title: &str, curves: &[(Points, Ink)]) -> Markup {
     let axis = XAxis {
         title: "time since the command [s]".to_owned(),
-        range: (0.0, SHOWN_S),
+        range: Range::new(0.0, SHOWN_S),
         divisor: 1.0,
     };
-    let drawn: Vec<_> = curves.iter().map(|(points, ink)| (series(points), *ink)).collect();
+    let drawn: Vec<(Series, Ink)> =
+        curves.iter().map(|(points, ink)| (points.iter().copied().collect(), *ink)).collect();
     let all: Vec<_> = drawn.iter().map(|(series, _)| series).collect();
     let y_range = y_range(&all, &[0.0]);
     let layers = drawn.iter().map(|(series, ink)| Layer::Curve(series, *ink)).collect();

@@ -1,0 +1,60 @@
+//! Images of a board for a calibration.
+
+use std::io::IsTerminal;
+use std::path::PathBuf;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+
+use crate::calibration::board::Board;
+use crate::calibration::sighting::{Looks, Sighting};
+use crate::cli::board_image::look_at;
+
+/// Pictures that were looked at.
+pub struct Pictures {
+    /// Their files, in their order.
+    pub files: Vec<PathBuf>,
+    /// What they show.
+    pub looks: Looks,
+    /// Those whose boards lay on the bed; none where the last one is to be taken.
+    pub on_bed: Vec<PathBuf>,
+}
+
+/// Looks for the board in all of these.
+pub fn look_at_all(board: &Board, files: &[PathBuf]) -> Looks {
+    let bar = progress(files.len());
+    let looks = files
+        .par_iter()
+        .map(|path| {
+            let name = name_of(path);
+            let look = look_at(board, &name, path);
+            bar.inc(1);
+            (name, look)
+        })
+        .collect();
+    bar.finish_and_clear();
+    looks
+}
+
+/// Names of files, without their folders.
+fn name_of(path: &std::path::Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// Pictures that a camera has taken so far, the first with the board on the bed.
+pub fn taken(files: &[PathBuf], kept: &[Sighting]) -> Pictures {
+    let looks = kept.iter().map(|sighting| (sighting.name.clone(), Ok(sighting.clone())));
+    let on_bed = files.first().cloned().into_iter().collect();
+    Pictures { files: files.to_vec(), looks: looks.collect(), on_bed }
+}
+
+fn progress(count: usize) -> ProgressBar {
+    if !std::io::stderr().is_terminal() {
+        tell!("looking for the board in {count} images");
+    }
+    let style = ProgressStyle::with_template("looking for the board {wide_bar} {pos}/{len}");
+    // Hidden by itself where standard error is not a terminal.
+    let bar = ProgressBar::new(count as u64);
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar
+}

@@ -1,0 +1,99 @@
+//! A camera of others becomes a calibration: the bed plane comes from pictures.
+
+use anyhow::Context;
+
+use super::arguments::ConvertArgs;
+use crate::calibration::board::{Board, Marks};
+use crate::calibration::equations::Model;
+use crate::calibration::exchange::{Import, Intrinsics};
+use crate::calibration::{Quality, file};
+use crate::cli::arguments::WrongArguments;
+use crate::cli::bed_plane::{Boards, Plane, looked_for};
+use crate::cli::board_arguments::{InnerCorners, board_of};
+use crate::cli::print::print;
+use crate::core::units::Mm;
+
+/// Corners on the bed may be so far off \[px\]; beyond that the pictures do not belong
+/// to this camera, or the boards lay on no plane.
+const MOST_OFF_PX: f64 = 0.5;
+/// A sharp picture of a flat board and a sound lens leave less \[px\].
+const DOUBTED_PX: f64 = 0.3;
+
+/// The text of a calibration: the camera of others, and a bed plane from pictures.
+pub fn text(
+    args: &ConvertArgs,
+    import: &Import,
+    notes: &mut Vec<String>,
+) -> anyhow::Result<String> {
+    let (Some(corners), Some(square)) = (args.board, args.square_mm) else {
+        return Err(WrongArguments::new("--plane needs --board and --square-mm").into());
+    };
+    let marks = args.marker_mm.map(|side| Marks { side, dictionary: args.dictionary });
+    let board = board_of(corners, square, marks)?;
+    let plane = bed_plane(args, &board, &import.intrinsics)?;
+    print(&plane.text());
+    let Intrinsics { image_size_px, camera, .. } = &import.intrinsics;
+    if let Some(px) = camera.fold(*image_size_px) {
+        notes.push(format!(
+            "the lens model turns over before pixel ({:.0}, {:.0}), and nothing can be measured there; \
+             calibrate with pictures of a board in the corners of the picture",
+            px.x, px.y
+        ));
+    }
+    let reprojection_rms_px = plane.on_bed.rms_px;
+    let quality = Quality {
+        reprojection_rms_px,
+        width_sigma_share: None,
+        seen_px: None,
+        heights_mm: None,
+        uncertainty: None,
+    };
+    if reprojection_rms_px > DOUBTED_PX {
+        notes.push(format!(
+            "corners are {reprojection_rms_px:.2} px off, a sharp picture of a flat board and a \
+             sound lens give less than {DOUBTED_PX}: is this the camera's calibration, with this \
+             focus and zoom?"
+        ));
+    }
+    notes.push(format!(
+        "how well a width is known does not stand in {}, and sigma_mm will not contain it: \
+         `truebead camera verify` with a further picture shows what is wrong, `truebead calibrate` \
+         with pictures of a board tells it",
+        args.input.display()
+    ));
+    let InnerCorners { columns, rows } = corners;
+    let from = format!(
+        "Camera and lens from {} ({}).\n\
+         Bed plane: {} below the face of a board with {columns}x{rows} inner corners and squares \
+         of {square} in {}.\n\
+         How well a width is known is not known; the error is that of the bed plane's pictures.",
+        args.input.display(),
+        import.format.name(),
+        plane.thickness,
+        plane.images.join(", "),
+    );
+    let bed = plane.on_bed.bed(plane.thickness);
+    let text = file::to_toml(camera, &bed, *image_size_px, plane.robot_z, Some(quality), &[from]);
+    file::parse(&args.out.display().to_string(), &text)
+        .context("with this camera nothing can be measured; nothing was written")?;
+    Ok(text)
+}
+
+fn bed_plane(args: &ConvertArgs, board: &Board, known: &Intrinsics) -> anyhow::Result<Plane> {
+    let mut boards = Boards::of(board);
+    for path in &args.plane {
+        let (image, corners) = looked_for(path, board, known.image_size_px)?;
+        boards.add(image, corners)?;
+    }
+    let model = Model { camera: known.camera, bend_mm: [0.0; 2] };
+    let other = format!("{MOST_OFF_PX} px is the most that is taken");
+    let (images, on_bed) = boards.fit(&model, MOST_OFF_PX, &other)?;
+    Ok(Plane {
+        images,
+        assumed: false,
+        passed_over: Vec::new(),
+        on_bed,
+        thickness: args.board_thickness_mm.unwrap_or(Mm::ZERO),
+        robot_z: args.robot_z_mm.unwrap_or(Mm::ZERO),
+    })
+}

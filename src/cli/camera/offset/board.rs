@@ -1,0 +1,168 @@
+//! From a picture of a board that the nozzle touches.
+
+use anyhow::{Context, bail};
+use nalgebra::Vector2;
+
+use super::answer::tell;
+use super::arguments::OffsetArgs;
+use crate::assembly::LoadedCell;
+use crate::calibration::offset::{Found, Gauge, OffsetError, Touch, find};
+use crate::cell::file::{Mount, Purpose};
+use crate::cli::arguments::WrongArguments;
+use crate::cli::board_image::{check_size, look_at};
+use crate::core::geometry::GridSize;
+use crate::core::units::Mm;
+use crate::sim::view::gauge_middle;
+use crate::vision::Axis;
+
+/// Standard deviation of a place that somebody told by eye.
+const TOUCH: Mm = Mm::constant(0.5);
+/// Way across the path that is more than somebody's eye \[mm\].
+const SIDEWAYS_MM: f64 = 3.0;
+/// Share by which a board may measure larger or smaller than it was said to be.
+const SCALE: f64 = 0.005;
+/// The same beyond which nothing is told.
+const NO_BOARD: f64 = 0.03;
+/// Corners further off a true board than this are of another plane \[mm\].
+const NOT_FLAT_MM: f64 = 2.0;
+/// Squares beyond the outermost ones that a nozzle may be told to be.
+const BEYOND: f64 = 2.0;
+/// Corners further off a true board than this were not measured on its plane \[mm\].
+const FLAT_MM: f64 = 0.5;
+
+/// Runs the command for a picture.
+pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
+    let needed = [
+        ("--cell CELL.toml", args.cell.is_some()),
+        ("--board COLUMNSxROWS with --square-mm", args.board.board.is_some()),
+        ("--nozzle-at X,Y", args.nozzle_at.is_some()),
+    ];
+    let missing: Vec<&str> =
+        needed.iter().filter(|(_, given)| !given).map(|(name, _)| *name).collect();
+    let (Some(cell), Some(board), Some(at)) = (&args.cell, &args.board.board, args.nozzle_at)
+    else {
+        let what = format!(
+            "{}: a picture (no recording) needs {} besides",
+            args.input.display(),
+            missing.join(", ")
+        );
+        return Err(WrongArguments::new(what).into());
+    };
+    let board = board.board()?;
+    let GridSize { columns, rows } = board.corners();
+    for (at, count) in at.into_iter().zip([columns, rows]) {
+        #[expect(clippy::cast_precision_loss, reason = "at most 100 corners a side")]
+        let (from, to) = (-1.0 - BEYOND, count as f64 + BEYOND);
+        if !(from..=to).contains(&at) {
+            let what = format!("--nozzle-at: found {at}, expected {from} to {to} on this board");
+            return Err(WrongArguments::new(what).into());
+        }
+    }
+    let touch = touch(args, at)?;
+    let loaded = LoadedCell::read(cell, Purpose::Measure)?;
+    let Some(expected) = loaded.calibration.image_size_px() else {
+        let what = format!("{}: {}", cell.display(), OffsetError::NoCamera);
+        return Err(WrongArguments::new(what).into());
+    };
+    let name = args.input.display().to_string();
+    let sighting = look_at(&board, &name, &args.input).with_context(|| name.clone())?;
+    check_size(&sighting, expected)?;
+    if touch.robot_z.is_some() && loaded.cell.mount == Some(Mount::Fixed) {
+        let what = format!(
+            "--robot-z-mm: the camera of {} is fixed, and does not rise with the robot; leave it out",
+            cell.display()
+        );
+        return Err(WrongArguments::new(what).into());
+    }
+    let found = find(&loaded.calibration, &gauge(&loaded), &board, &sighting.corners, &touch)
+        .map_err(anyhow::Error::from)
+        .with_context(|| name.clone())?;
+    if found.scale_error.abs() > NO_BOARD || found.rms_mm > NOT_FLAT_MM {
+        bail!(
+            "{name}: the board measures {:+.1} % of its size, and its corners lie {:.2} mm off a true \
+             one: it does not lie on the bed of this calibration with its face {} above it; see \
+             --square-mm, --board-thickness-mm and --robot-z-mm",
+            100.0 * found.scale_error,
+            found.rms_mm,
+            touch.thickness
+        );
+    }
+    answer(&found, touch, loaded.cell.run.as_ref().map(|run| run.camera.offset));
+    Ok(())
+}
+
+fn touch(args: &OffsetArgs, at: [f64; 2]) -> Result<Touch, WrongArguments> {
+    let sigma = args.touch_sigma_mm.unwrap_or(TOUCH);
+    let thickness = args.board_thickness_mm.unwrap_or(Mm::ZERO);
+    for (name, value) in [("--touch-sigma-mm", sigma), ("--board-thickness-mm", thickness)] {
+        if value < Mm::ZERO {
+            let what = format!("{name}: found {value}, expected 0 mm or more");
+            return Err(WrongArguments::new(what));
+        }
+    }
+    Ok(Touch { at, sigma, thickness, robot_z: args.robot_z_mm })
+}
+
+/// The nozzle lies beyond the top of a vertical gauge and beyond the right end of a
+/// horizontal one.
+fn gauge(loaded: &LoadedCell) -> Gauge {
+    let cell = &loaded.cell;
+    let (ahead, right) = match cell.gauge.axis {
+        Axis::Vertical => (Vector2::new(0.0, -1.0), Vector2::new(1.0, 0.0)),
+        Axis::Horizontal => (Vector2::new(1.0, 0.0), Vector2::new(0.0, 1.0)),
+    };
+    Gauge {
+        middle: gauge_middle(&cell.gauge.roi),
+        ahead,
+        right,
+        surface_height: cell.surface_height,
+        surface_height_sigma: cell.surface_height_sigma,
+    }
+}
+
+fn answer(found: &Found, touch: Touch, now: Option<Mm>) {
+    let parts = found.parts;
+    let sigma = parts.sigma().get();
+    say!(
+        "offset     {:.2} ± {sigma:.2} mm from the nozzle to the middle of the gauge, on a straight \
+         path",
+        found.along_mm
+    );
+    let side = if found.across_mm < 0.0 { "left" } else { "right" };
+    say!("sideways   {:.2} mm to the {side} of the gauge's axis", found.across_mm.abs());
+    if found.across_mm.abs() > SIDEWAYS_MM + 3.0 * sigma {
+        say!(
+            "           WARNING: on a straight path the bead would pass the gauge's middle so far"
+        );
+        say!("           off; see --nozzle-at, or whether the camera is turned against the path");
+    }
+    let calibration = parts.calibration.map_or_else(
+        || "calibration not known".to_owned(),
+        |sigma| format!("calibration {:.2}", sigma.get()),
+    );
+    say!(
+        "sigma      touch {:.2}, corners {:.2}, {calibration}, surface height {:.2} mm",
+        parts.touch.get(),
+        parts.corners.get(),
+        parts.height.get()
+    );
+    let ([x, y], first) = (touch.at, found.first_corner);
+    say!(
+        "board      the nozzle is {x},{y} squares from the corner at {:.1}, {:.1} px, taken for the \
+         first",
+        first.x,
+        first.y
+    );
+    say!("           corners lie {:.3} mm off a true board (RMS)", found.rms_mm);
+    if found.scale_error.abs() > SCALE || found.rms_mm > FLAT_MM {
+        say!(
+            "           WARNING: it measures {:+.2} % of its size; see --square-mm, \
+             --board-thickness-mm",
+            100.0 * found.scale_error
+        );
+        say!(
+            "           and --robot-z-mm, or whether the calibration holds (truebead camera verify)"
+        );
+    }
+    tell(found.along_mm, sigma, now);
+}

@@ -1,0 +1,141 @@
+//! `truebead camera verify`: whether a calibration still holds.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Context;
+use clap::Args;
+
+use crate::calibration::Calibration;
+use crate::calibration::verify::{Findings, verify};
+use crate::cli::arguments::WrongArguments;
+use crate::cli::arguments::parse_length;
+use crate::cli::board_arguments::BoardArgs;
+use crate::cli::board_image::{check_size, look_at};
+use crate::core::units::Mm;
+use crate::io::calibration_file;
+
+/// Largest error of a width that is borne unless another is given \[%\].
+const MOST_PERCENT: f64 = 0.2;
+/// Standard deviations of what the calibration itself leaves that are borne, too.
+const STANDARD_DEVIATIONS: f64 = 3.0;
+/// A lens leaves so many times what it left when it was calibrated.
+const LENS_CHANGED: f64 = 2.0;
+/// A lens that leaves less is sound in any case \[px\].
+const LENS_CHANGED_PX: f64 = 0.15;
+/// A board that is further off its place than this is higher, and not the noise
+/// \[mm\].
+const HIGHER_MM: f64 = 0.3;
+/// A board that is tilted against the bed by more than this does not lie on it \[°\].
+const FLAT_DEG: f64 = 2.0;
+
+/// Measures a board on the bed and says whether the calibration still holds.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  truebead camera verify today.png --board 9x6 --square-mm 20 --calibration calib.toml
+
+Lay the board flat on the bed, the robot where it was when the bed plane was
+fixed, and take one picture. Exit status 1 where the calibration does not hold
+any more.")]
+pub struct VerifyArgs {
+    /// Picture of the board on the bed
+    image: PathBuf,
+    #[command(flatten)]
+    board: BoardArgs,
+    /// Calibration file
+    #[arg(long, value_name = "FILE")]
+    calibration: PathBuf,
+    /// Height of the board's printed face above the bed [mm]
+    #[arg(long, value_name = "MM", default_value = "0", value_parser = parse_length)]
+    board_thickness_mm: Mm,
+    /// Largest error of a width that is borne [% of the width]
+    #[arg(long, value_name = "PERCENT", default_value_t = MOST_PERCENT)]
+    max_error_percent: f64,
+}
+
+/// Runs the command; the figures go to standard output.
+pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
+    let board = args.board.board()?;
+    if !(args.max_error_percent.is_finite() && args.max_error_percent > 0.0) {
+        let what =
+            format!("--max-error-percent: found {}, expected more than 0", args.max_error_percent);
+        return Err(WrongArguments::new(what).into());
+    }
+    if args.board_thickness_mm < Mm::ZERO {
+        return Err(WrongArguments::new("the board's thickness cannot be below 0 mm").into());
+    }
+    if !args.image.is_file() {
+        let what = format!("{}: no such picture", args.image.display());
+        return Err(WrongArguments::new(what).into());
+    }
+    let calibration = calibration_file::read(&args.calibration)?;
+    let name = args.image.display().to_string();
+    let sighting = look_at(&board, &name, &args.image).with_context(|| name.clone())?;
+    if let Some(expected) = calibration.image_size_px() {
+        check_size(&sighting, expected)?;
+    }
+    let found = verify(&calibration, &board, &sighting.corners, args.board_thickness_mm)
+        .map_err(anyhow::Error::from)
+        .with_context(|| name.clone())?;
+    let (rms_px, share) = match &calibration {
+        Calibration::Full { quality: Some(quality), .. } => {
+            (Some(quality.reprojection_rms_px), quality.width_sigma_share)
+        }
+        _ => (None, None),
+    };
+    let borne = (args.max_error_percent / 100.0).hypot(STANDARD_DEVIATIONS * share.unwrap_or(0.0));
+    tell(&found, args, borne, rms_px);
+    Ok(if found.holds(borne) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn tell(found: &Findings, args: &VerifyArgs, borne: f64, rms_px: Option<f64>) {
+    let (column, row, length) = found.worst_at;
+    say!("a square measures {:.4} mm ({:+.3} %)", found.square_mm, 100.0 * found.scale_error);
+    say!(
+        "largest error of a width {:+.3} % ({:+.3} mm in {length:.0} mm, about column {column:.1}, \
+         row {row:.1} of the board's corners), of which the corners' noise may make {:.3} %",
+        100.0 * found.worst_error,
+        found.worst_error * length,
+        100.0 * found.noise
+    );
+    say!("corners lie {:.3} mm off a true board (RMS)", found.rms_mm);
+    say!(
+        "by its size the board is {:+.2} mm above its place and tilted by {:.2}° against the bed",
+        found.height_mm,
+        found.tilt_deg
+    );
+    let before = rms_px.map_or_else(String::new, |px| format!(" ({px:.3} px when calibrated)"));
+    say!("reprojection error of the lens alone {:.3} px{before}", found.reprojection_rms_px);
+    let how = format!(
+        "{} % are borne, and {STANDARD_DEVIATIONS} standard deviations of what the calibration leaves",
+        args.max_error_percent
+    );
+    if found.holds(borne) {
+        say!(
+            "HOLDS: beyond the corners' noise no width is more than {:.3} % wrong ({how})",
+            100.0 * borne
+        );
+        return;
+    }
+    say!("DOES NOT HOLD: a width is more than {:.3} % wrong ({how})", 100.0 * borne);
+    let has_changed =
+        |px: f64| found.reprojection_rms_px > (LENS_CHANGED * px).max(LENS_CHANGED_PX);
+    if rms_px.is_some_and(has_changed) {
+        say!("  the lens is not as it was: focus, zoom or the board's flatness; calibrate anew");
+    } else if found.tilt_deg > FLAT_DEG {
+        say!("  the board does not lie flat on the bed: it is tilted by {:.1}°", found.tilt_deg);
+    } else if found.height_mm.abs() > HIGHER_MM {
+        say!(
+            "  as if the board lay {:.2} mm {} than {} above the bed: see that --square-mm and \
+             --board-thickness-mm are right, and that the robot stands at the z of the bed \
+             plane's picture; otherwise the camera has moved, so take the bed plane anew \
+             (calibrate --plane)",
+            found.height_mm.abs(),
+            if found.height_mm > 0.0 { "higher" } else { "lower" },
+            args.board_thickness_mm
+        );
+    } else {
+        say!("  see that the squares have the size that was given, and that the board lies flat");
+    }
+}

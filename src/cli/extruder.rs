@@ -1,0 +1,38 @@
+//! `truebead extruder`: models of an extruder, from test signals to a library.
+
+mod columns;
+mod excite;
+mod identify;
+mod keep;
+mod log;
+mod models;
+mod noise;
+mod setting;
+mod starts;
+
+use std::process::ExitCode;
+
+use clap::Subcommand;
+
+/// Models of an extruder, from test signals to a library
+#[derive(Debug, Subcommand)]
+pub enum ExtruderCommand {
+    Excite(excite::ExciteArgs),
+    Identify(Box<identify::IdentifyArgs>),
+    Starts(starts::StartsArgs),
+    Noise(noise::NoiseArgs),
+    Columns(columns::ColumnsArgs),
+    Models(models::ModelsArgs),
+}
+
+/// Runs one of them.
+pub fn run(command: &ExtruderCommand) -> anyhow::Result<ExitCode> {
+    match command {
+        ExtruderCommand::Excite(args) => excite::run(args).map(|()| ExitCode::SUCCESS),
+        ExtruderCommand::Identify(args) => identify::run(args).map(|()| ExitCode::SUCCESS),
+        ExtruderCommand::Starts(args) => starts::run(args).map(|()| ExitCode::SUCCESS),
+        ExtruderCommand::Noise(args) => noise::run(args).map(|()| ExitCode::SUCCESS),
+        ExtruderCommand::Columns(args) => columns::run(args).map(|()| ExitCode::SUCCESS),
+        ExtruderCommand::Models(args) => models::run(args),
+    }
+}

@@ -1,0 +1,114 @@
+//! How forms, dead times and filters are written.
+
+use crate::identify::fit::{DeadTime, MOST_POLES, Structure};
+use crate::numeric::hampel::Hampel;
+use crate::numeric::savgol::SavGol;
+
+/// Forms that one word stands for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Forms(pub Vec<Structure>);
+
+/// A dead time that is told, or where it is looked for; none for the usual
+/// range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted(pub Option<DeadTime>);
+
+/// One word for a form, or for those that are compared.
+pub fn parse_forms(text: &str) -> Result<Forms, String> {
+    let forms = match text {
+        "compare" => vec![
+            Structure::FirstOrder { zero: false },
+            Structure::FirstOrder { zero: true },
+            Structure::SecondOrderOscillating { zero: false },
+            Structure::SecondOrderOscillating { zero: true },
+            Structure::Transfer { poles: 3, zeros: 2 },
+        ],
+        "fopdt" => vec![Structure::FirstOrder { zero: false }],
+        "fopdt-zero" => vec![Structure::FirstOrder { zero: true }],
+        "sopdt" => vec![Structure::SecondOrderOscillating { zero: false }],
+        "sopdt-zero" => vec![Structure::SecondOrderOscillating { zero: true }],
+        "sopdt-real" => vec![Structure::SecondOrderReal { zero: false }],
+        "sopdt-real-zero" => vec![Structure::SecondOrderReal { zero: true }],
+        counts => vec![parse_counts(counts)?],
+    };
+    Ok(Forms(forms))
+}
+
+fn parse_counts(text: &str) -> Result<Structure, String> {
+    let (poles, zeros) = pair::<usize>(text).ok_or(
+        "expected compare, fopdt, fopdt-zero, sopdt, sopdt-zero, sopdt-real, sopdt-real-zero, or \
+         numbers of poles and zeros such as 2,1",
+    )?;
+    if poles == 0 || poles > MOST_POLES || zeros > poles {
+        return Err(format!("expected 1 to {MOST_POLES} poles, and no more zeros than poles"));
+    }
+    Ok(Structure::Transfer { poles, zeros })
+}
+
+fn pair<T: std::str::FromStr>(text: &str) -> Option<(T, T)> {
+    let (a, b) = text.split_once(',')?;
+    Some((a.trim().parse().ok()?, b.trim().parse().ok()?))
+}
+
+/// A dead time, a range of them, or `estimate`.
+pub fn parse_dead_time(text: &str) -> Result<Wanted, String> {
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|s| (0.0..=1e4).contains(s));
+    if text == "estimate" {
+        return Ok(Wanted(None));
+    }
+    let wanted = match text.split_once("..") {
+        Some((from, to)) => number(from)
+            .zip(number(to))
+            .filter(|(from, to)| from < to)
+            .map(|(least_s, most_s)| DeadTime::Estimated { least_s, most_s }),
+        None => number(text).map(DeadTime::Given),
+    };
+    wanted.map(|wanted| Wanted(Some(wanted))).ok_or_else(|| {
+        "expected 0 to 10000 s, a range of them such as 0..3, or estimate".to_owned()
+    })
+}
+
+/// A gap that is bridged.
+pub fn parse_gap(text: &str) -> Result<f64, String> {
+    let gap = text.trim().parse::<f64>().ok().filter(|s| (0.0..=1e4).contains(s));
+    gap.ok_or_else(|| "expected 0 to 10000 s".to_owned())
+}
+
+/// K,T.
+pub fn parse_hampel(text: &str) -> Result<Hampel, String> {
+    let wrong = "expected samples to either side and standard deviations, such as 5,3";
+    let (half_width, threshold) = text.split_once(',').ok_or(wrong)?;
+    let half_width = half_width.trim().parse().map_err(|_| wrong)?;
+    let threshold = threshold.trim().parse().map_err(|_| wrong)?;
+    Hampel::new(half_width, threshold).map_err(|error| error.to_string())
+}
+
+/// W,P.
+pub fn parse_smooth(text: &str) -> Result<SavGol, String> {
+    let (window, degree) =
+        pair(text).ok_or("expected samples and a degree of polynomials, such as 11,3")?;
+    SavGol::new(window, degree).map_err(|error| error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+
+    #[test]
+    fn forms_and_dead_times_are_read() {
+        assert_eq!(parse_forms("compare").unwrap().0.len(), 5);
+        let counts = Structure::Transfer { poles: 2, zeros: 1 };
+        assert_eq!(parse_forms("2,1").unwrap().0, [counts]);
+        for wrong in ["1,2", "5,0", "0,0", "second"] {
+            assert!(parse_forms(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(parse_dead_time("0.4").unwrap().0, Some(DeadTime::Given(0.4)));
+        let range = DeadTime::Estimated { least_s: 0.0, most_s: 3.0 };
+        assert_eq!(parse_dead_time("0..3").unwrap().0, Some(range));
+        assert!(parse_dead_time("3..1").is_err() && parse_dead_time("-1").is_err());
+        assert!(parse_hampel("5,3").is_ok() && parse_hampel("0,3").is_err());
+        assert!(parse_smooth("11,3").is_ok() && parse_smooth("10,3").is_err());
+    }
+}

@@ -1,0 +1,50 @@
+//! Where a model is kept: in a folder of its own, and in a library that cells
+//! look it up in.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, anyhow};
+
+use crate::cli::arguments::WrongArguments;
+use crate::cli::arguments::refuse_replacing;
+use crate::identify::file::parse;
+use crate::identify::library::file_name;
+use crate::io::model_file::read_library;
+use crate::rows::output::{make_folder, write_whole};
+
+/// What a model is called in its own folder.
+pub const MODEL: &str = "model.toml";
+
+/// What starts and stops are called in their own folder.
+pub const STARTS: &str = "starts.toml";
+
+/// Refuses a folder that holds a file of this name already.
+pub fn refuse_taken(folder: &Path, name: &str) -> Result<(), WrongArguments> {
+    refuse_replacing(&folder.join(name), "folder")
+}
+
+/// Adds the text of a model, which `kept` holds as well, to a library. Fails
+/// where another model holds for the same: a cell could not tell them apart.
+pub fn add(library: &Path, text: &str, kept: &Path) -> Result<PathBuf> {
+    let kept = kept.display().to_string();
+    let model = parse(&kept, text)?;
+    let name = file_name(&model).context("the model tells no material, nozzle and temperature")?;
+    make_folder(library)?;
+    let found = read_library(library)?;
+    for broken in &found.broken {
+        tell!("warning: not looked at: {broken}");
+    }
+    let same = found.library.same(&model);
+    let path = library.join(same.map_or(name.as_str(), |entry| entry.name.as_str()));
+    if same.is_some_and(|entry| entry.model == model) {
+        return Ok(path);
+    }
+    if path.exists() {
+        return Err(anyhow!(
+            "{}: there is another model for the same material, nozzle, temperature and units; it \
+             stays as it is. The new one is {kept}: move the old one away, and copy it there",
+            path.display()
+        ));
+    }
+    Ok(write_whole(library, &name, text.as_bytes())?)
+}

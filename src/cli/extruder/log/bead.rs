@@ -1,0 +1,124 @@
+//! Options for an output that was measured on the bead, some way behind the
+//! nozzle: when it was extruded, and the flow that laid it.
+
+use anyhow::{Context, Result, anyhow};
+use clap::Args;
+
+use super::layer::Layer;
+use super::rows::Rows;
+use crate::cli::arguments::WrongArguments;
+use crate::core::quantity::Unit;
+use crate::core::units::Mm;
+use crate::extruder::demand::section;
+use crate::identify::align::{AlignError, to_extruded};
+use crate::identify::flow::at_moments;
+
+/// The column that a flow gets that is made of others, as in a recording.
+pub const LAID_FLOW: &str = "laid_flow_mm3_per_s";
+/// What was measured on the bead.
+#[derive(Debug, Args)]
+pub struct Bead {
+    #[command(flatten)]
+    pub layer: Layer,
+    /// Column of the path length [mm], for --measured-at-offset-mm
+    #[arg(long, value_name = "COLUMN", requires = "measured_at_offset_mm")]
+    pub position: Option<String>,
+    /// Column of the bead's area [mm²]; output is area times speed
+    #[arg(long, value_name = "COLUMN", requires = "speed", conflicts_with_all = ["output", "width"])]
+    pub area: Option<String>,
+    /// Column of its width [mm], in place of the area
+    #[arg(
+        long,
+        value_name = "COLUMN",
+        requires = "speed",
+        requires = "layer_height_mm",
+        conflicts_with = "output"
+    )]
+    pub width: Option<String>,
+    /// Column of the speed that laid the bead [mm/s]
+    #[arg(long, value_name = "COLUMN")]
+    pub speed: Option<String>,
+}
+
+impl Bead {
+    /// Whether the output is a flow that is made of other columns.
+    pub const fn makes_flow(&self) -> bool {
+        self.area.is_some() || self.width.is_some()
+    }
+
+    /// Refuses options that a recording has no use for.
+    pub fn refuse_columns(&self) -> Result<(), WrongArguments> {
+        let told = [
+            ("--position", &self.position),
+            ("--area", &self.area),
+            ("--width", &self.width),
+            ("--speed", &self.speed),
+        ];
+        match told.iter().find(|(_, column)| column.is_some()) {
+            Some((option, _)) => Err(WrongArguments::new(format!(
+                "{option} is for tables: a recording has the flow of its bead already, brought to \
+                 when it was laid, as --output {LAID_FLOW}"
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// The output of a table, where it is not made of others the column of this name, one value a row from its beginning; fewer where
+    /// the bead has not come to its measurement when the table ends.
+    pub fn output(&self, rows: &Rows<'_>, output: Option<&str>) -> Result<Vec<f64>> {
+        if self.position.is_none() && self.layer.measured_at_offset_mm.is_some_and(|mm| mm > 0.0) {
+            let what = "--measured-at-offset-mm needs --position, the way along the bead";
+            return Err(WrongArguments::new(what).into());
+        }
+        let measured = match (&self.area, &self.width) {
+            (Some(area), _) => rows.in_unit(area, Unit::Mm2)?,
+            (None, Some(width)) => self.areas(rows, width)?,
+            (None, None) => rows.column(output.unwrap_or_default())?,
+        };
+        let extruded = match &self.position {
+            Some(position) => self.aligned(rows, &measured, position)?,
+            None => measured,
+        };
+        match self.speed.as_ref().filter(|_| self.makes_flow()) {
+            Some(speed) => {
+                let speed_mm_per_s = rows.in_unit(speed, Unit::MmPerS)?;
+                Ok(at_moments(&speed_mm_per_s, &extruded))
+            }
+            None => Ok(extruded),
+        }
+    }
+
+    /// What was measured, at the moments of extrusion.
+    fn aligned(&self, rows: &Rows<'_>, measured: &[f64], position: &str) -> Result<Vec<f64>> {
+        let way = rows.in_unit(position, Unit::Mm)?;
+        let offset = self.layer.offset()?.unwrap_or(0.0);
+        let found = to_extruded(&way, measured, offset).map_err(|error| match error {
+            AlignError::Falls { at, .. } | AlignError::NotFinite { at, .. } => {
+                let line = rows.table.line(at.saturating_sub(1));
+                anyhow!(error).context(format!("{}, line {line}, column {position}", rows.name))
+            }
+            other => anyhow!(other).context(rows.name.to_owned()),
+        })?;
+        let found: Vec<f64> = found.into_iter().map_while(|value| value).collect();
+        if found.is_empty() {
+            let went = way.last().copied().unwrap_or(0.0) - way.first().copied().unwrap_or(0.0);
+            return Err(anyhow!(
+                "{}: nothing of the bead comes to where it is measured: {position} goes on by \
+                 {went} mm, and --measured-at-offset-mm is {offset}",
+                rows.name
+            ));
+        }
+        Ok(found)
+    }
+
+    /// Areas of a bead with round sides.
+    fn areas(&self, rows: &Rows<'_>, width: &str) -> Result<Vec<f64>> {
+        let height = self.layer.layer_height()?.unwrap_or_default();
+        let area = |(row, width_mm): (usize, &f64)| -> Result<f64> {
+            let place = || format!("{}, line {}, column {width}", rows.name, rows.table.line(row));
+            let bead = Mm::new(*width_mm).with_context(place)?;
+            Ok(section(bead, height).with_context(place)?.get())
+        };
+        rows.in_unit(width, Unit::Mm)?.iter().enumerate().map(area).collect()
+    }
+}

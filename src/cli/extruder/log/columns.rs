@@ -1,0 +1,138 @@
+//! Which part of a log is meant, its time, and what its columns hold.
+
+use clap::Args;
+
+use crate::cli::arguments::WrongArguments;
+use crate::core::quantity::{Quantity, Unit};
+use crate::identify::series::Series;
+
+/// Time, units and part of a log.
+#[derive(Debug, Args)]
+pub struct Columns {
+    /// Column of time [default: the one that begins with time]
+    #[arg(long, value_name = "COLUMN")]
+    pub time: Option<String>,
+    /// Unit of a column, such as nozzle=bar; may be repeated
+    #[arg(long, value_name = "COLUMN=UNIT", value_parser = parse_told)]
+    pub unit: Vec<Told>,
+    /// Leave out what was logged before this moment [s]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub from_s: Option<f64>,
+    /// Leave out what was logged after this moment [s]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub to_s: Option<f64>,
+}
+
+/// A column's unit that was told.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Told {
+    column: String,
+    unit: String,
+}
+
+/// Seconds that a unit of time is long.
+const TIMES: [(&str, f64); 3] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
+
+impl Columns {
+    /// What a column of the input or the output holds.
+    pub fn quantity(&self, column: &str) -> Result<Quantity, WrongArguments> {
+        let told = match self.told(column) {
+            None => None,
+            Some(word) => Some(Unit::of_word(word).ok_or_else(|| {
+                WrongArguments::new(format!("--unit {column}={word}: expected one of {}", units()))
+            })?),
+        };
+        Quantity::of_column(column, told).ok_or_else(|| {
+            WrongArguments::new(format!(
+                "the name {column} does not end with a unit (one of {}); tell it with --unit \
+                 {column}=UNIT",
+                units()
+            ))
+        })
+    }
+
+    /// The column of time among these, and how many seconds its unit has.
+    pub fn time(&self, known: &[String]) -> Result<(String, f64), WrongArguments> {
+        let list = known.join(", ");
+        let mut candidates =
+            known.iter().filter(|name| name.to_ascii_lowercase().starts_with("time"));
+        let column = match (&self.time, candidates.next(), candidates.next()) {
+            (Some(told), ..) => told,
+            (None, Some(only), None) => only,
+            (None, None, _) => {
+                let what = format!("no column begins with time; name it with --time ({list})");
+                return Err(WrongArguments::new(what));
+            }
+            (None, Some(_), Some(_)) => {
+                let what =
+                    format!("several columns begin with time; name one with --time ({list})");
+                return Err(WrongArguments::new(what));
+            }
+        };
+        let word = self.told(column).or_else(|| column.rsplit_once('_').map(|(_, end)| end));
+        let unit = TIMES.iter().find(|unit| Some(unit.0) == word).ok_or_else(|| {
+            WrongArguments::new(format!(
+                "the unit of {column} is not told; add --unit {column}=s, {column}=ms or {column}=us"
+            ))
+        })?;
+        Ok((column.clone(), unit.1))
+    }
+
+    /// The unit of a column as it was told.
+    pub fn told(&self, column: &str) -> Option<&str> {
+        self.unit.iter().find(|told| told.column == column).map(|told| told.unit.as_str())
+    }
+
+    fn span(&self) -> (f64, f64) {
+        (self.from_s.unwrap_or(f64::NEG_INFINITY), self.to_s.unwrap_or(f64::INFINITY))
+    }
+
+    /// Keeps of columns of a table what was asked for; returns the first row
+    /// that is kept. Rows without a value of the output are left out.
+    pub fn cut(&self, time_s: &mut Vec<f64>, input: &mut Vec<f64>, output: &mut Vec<f64>) -> usize {
+        let (from_s, to_s) = self.span();
+        time_s.truncate(output.len());
+        let first = time_s.iter().position(|time| *time >= from_s).unwrap_or(time_s.len());
+        let end = time_s.iter().rposition(|time| *time <= to_s).map_or(first, |last| last + 1);
+        for column in [time_s, input, output] {
+            column.truncate(end.max(first));
+            column.drain(..first);
+        }
+        first
+    }
+
+    /// Keeps of a column of a recording what was asked for.
+    pub fn cut_series(&self, column: &Series) -> Series {
+        let (from_s, to_s) = self.span();
+        column.within(from_s, to_s)
+    }
+
+    /// A column that a unit was told of and that is not there.
+    pub fn stray(&self, known: &[String]) -> Option<&str> {
+        self.unit
+            .iter()
+            .map(|told| told.column.as_str())
+            .find(|told| !known.iter().any(|name| name == told))
+    }
+}
+
+fn units() -> String {
+    Unit::all().map(Unit::word).collect::<Vec<_>>().join(", ")
+}
+
+fn parse_told(text: &str) -> Result<Told, String> {
+    let (column, unit) =
+        text.split_once('=').ok_or("write the column and its unit, such as nozzle=bar")?;
+    Ok(Told { column: column.trim().to_owned(), unit: unit.trim().to_owned() })
+}
+
+/// Refuses one column that is named twice.
+pub fn refuse_same(input: &str, output: &str) -> Result<(), WrongArguments> {
+    if input != output {
+        return Ok(());
+    }
+    Err(WrongArguments::new(format!(
+        "--input and --output are both {input}: a model tells the one from the other; name what the \
+         extruder is told, and what comes of it"
+    )))
+}

@@ -1,0 +1,71 @@
+//! The columns of a table, and what is wrong with them by line.
+
+use anyhow::{Context, Result, anyhow};
+
+use super::columns::Columns;
+use crate::cli::arguments::WrongArguments;
+use crate::core::quantity::Unit;
+use crate::identify::experiment::ExperimentError;
+use crate::identify::table::{Table, TableError};
+
+/// The columns of a table.
+pub struct Rows<'a> {
+    /// The table.
+    pub table: &'a Table,
+    /// What messages call it.
+    pub name: &'a str,
+    /// What its columns hold.
+    pub columns: &'a Columns,
+}
+
+impl Rows<'_> {
+    /// The numbers of a column.
+    pub fn column(&self, column: &str) -> Result<Vec<f64>> {
+        match self.table.column(column) {
+            Err(error @ TableError::NoColumn { .. }) => {
+                Err(WrongArguments::new(format!("{}: {error}", self.name)).into())
+            }
+            other => other.with_context(|| self.name.to_owned()),
+        }
+    }
+
+    /// The numbers of a column in one unit.
+    pub fn in_unit(&self, column: &str, unit: Unit) -> Result<Vec<f64>> {
+        let values = self.column(column)?;
+        let found = self.columns.quantity(column)?.unit;
+        if found != unit {
+            let what = format!(
+                "{}: {column} is in {found}, expected {unit} (--unit {column}={} tells another)",
+                self.name,
+                unit.word()
+            );
+            return Err(WrongArguments::new(what).into());
+        }
+        Ok(values)
+    }
+}
+
+/// Refuses a unit that is told of a column which is not there.
+pub fn check_told(columns: &Columns, known: &[String], name: &str) -> Result<(), WrongArguments> {
+    match columns.stray(known) {
+        None => Ok(()),
+        Some(stray) => {
+            let list = known.join(", ");
+            let what = format!("{name}: --unit {stray}: no such column; the columns are {list}");
+            Err(WrongArguments::new(what))
+        }
+    }
+}
+
+/// The line in the file beside the number of the sample.
+pub fn at_line(table: &Table, first: usize, name: &str, error: ExperimentError) -> anyhow::Error {
+    let sample = match &error {
+        ExperimentError::Order { at, .. } | ExperimentError::Outlier { at, .. } => Some(*at),
+        ExperimentError::Gap { gap, .. } => Some(gap.after),
+        _ => None,
+    };
+    match sample {
+        Some(at) => anyhow!(error).context(format!("{name}, line {}", table.line(first + at))),
+        None => anyhow!(error).context(name.to_owned()),
+    }
+}

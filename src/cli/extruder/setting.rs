@@ -1,0 +1,43 @@
+//! What a model holds for.
+
+use clap::Args;
+
+use crate::cli::arguments::WrongArguments;
+use crate::identify::file::Setting;
+
+/// Material, nozzle and temperature.
+#[derive(Debug, Args)]
+pub struct SettingArgs {
+    /// Material that the model holds for
+    #[arg(long)]
+    pub material: Option<String>,
+    /// Diameter of the nozzle that it holds for [mm]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub nozzle_mm: Option<f64>,
+    /// Temperature of the material that it holds for [°C]
+    #[arg(long, value_name = "C", allow_negative_numbers = true)]
+    pub temperature_c: Option<f64>,
+}
+
+impl SettingArgs {
+    /// What the model holds for.
+    pub fn setting(&self) -> Result<Setting, WrongArguments> {
+        let told = [
+            ("--nozzle-mm", self.nozzle_mm, 0.01..=1e3, "0.01 to 1000 mm"),
+            ("--temperature-c", self.temperature_c, -100.0..=2000.0, "-100 to 2000 °C"),
+        ];
+        for (name, value, range, expected) in told {
+            if let Some(value) = value.filter(|value| !range.contains(value)) {
+                return Err(WrongArguments::new(format!("{name} {value}: expected {expected}")));
+            }
+        }
+        if self.material.as_ref().is_some_and(|name| name.trim().is_empty()) {
+            return Err(WrongArguments::new("--material: expected a name"));
+        }
+        Ok(Setting {
+            material: self.material.clone(),
+            nozzle_mm: self.nozzle_mm,
+            temperature_c: self.temperature_c,
+        })
+    }
+}

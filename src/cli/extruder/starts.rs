@@ -1,0 +1,138 @@
+//! `truebead extruder starts`: how an extruder starts and stops, from a log of it.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+
+use super::keep;
+use super::log::columns::{Columns, refuse_same};
+use super::log::layer::Layer;
+use super::log::rows::{Rows, at_line, check_told};
+use super::log::source::Source;
+use super::setting::SettingArgs;
+use crate::cli::arguments::WrongArguments;
+use crate::cli::arguments::free_folder;
+use crate::core::quantity::{Quantity, Unit};
+use crate::identify::experiment::{Rules, check_time};
+use crate::identify::series::Series;
+use crate::identify::start_stop::file::to_toml;
+use crate::identify::table::Table;
+use crate::report::identify::starts::{StartLogs, StartStudy, page, study, text};
+use crate::rows::output::{make_folder, write_whole};
+
+/// Litres a minute in mm³/s.
+const MM3_PER_S_PER_L_PER_MIN: f64 = 1e6 / 60.0;
+
+/// Finds from a log the delay of starts and what drools after a stop.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Example:
+  truebead extruder identify --example example/
+  truebead extruder starts example/starts.csv --input screw_rpm --output flow_mm3_per_s
+
+How late the first flow comes is told by the time that the pump stood before. The
+file starts.toml is for the key starts of [extruder] in a cell.")]
+pub struct StartsArgs {
+    /// Table of logged data
+    #[arg(value_name = "DATA.csv")]
+    data: PathBuf,
+    /// Column of what goes in, such as the speed of the screw
+    #[arg(long, value_name = "COLUMN")]
+    input: String,
+    /// Column of the flow that comes out
+    #[arg(long, value_name = "COLUMN")]
+    output: String,
+    #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
+    setting: SettingArgs,
+    /// Folder for starts.toml and report.html; one that holds such a file already is
+    /// refused [default: starts, or the first of starts-2, starts-3 … that is free]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+/// Runs the command; the answer goes to standard output.
+pub fn run(args: &StartsArgs) -> Result<()> {
+    let setting = args.setting.setting()?;
+    let folder = args.out.clone().unwrap_or_else(|| free_folder("starts"));
+    keep::refuse_taken(&folder, keep::STARTS)?;
+    let logs = read(args)?;
+    let source = logs.source.clone();
+    let found = study(logs, setting).with_context(|| source)?;
+    say!("{}", text(&found).trim_end());
+    write_all(&found, &folder)?;
+    say!("file       {}", folder.join(keep::STARTS).display());
+    say!("report     {}", folder.join("report.html").display());
+    Ok(())
+}
+
+fn write_all(found: &StartStudy, folder: &Path) -> Result<()> {
+    let version = env!("CARGO_PKG_VERSION");
+    let notes = [format!("Fitted by truebead {version} to {}.", found.logs.source), text(found)];
+    make_folder(folder)?;
+    write_whole(folder, "report.html", page(found).as_bytes())?;
+    // Last, for one that is there is never replaced: what failed can be tried again.
+    write_whole(folder, keep::STARTS, to_toml(&found.file, &notes).as_bytes())?;
+    Ok(())
+}
+
+fn read(args: &StartsArgs) -> Result<StartLogs> {
+    let StartsArgs { data, input, output, columns, .. } = args;
+    refuse_same(input, output)?;
+    let name = data.display().to_string();
+    let table = match Source::read(data, &Layer::default())? {
+        Source::Table(table) => table,
+        Source::Recording(_) => {
+            let what = format!(
+                "{name}: expected a table: of a recording only the longest bead with a \
+                 running pump is looked at, and there is no stop in it"
+            );
+            return Err(WrongArguments::new(what).into());
+        }
+    };
+    check_told(columns, table.names(), &name)?;
+    let (told, came) = (columns.quantity(input)?, columns.quantity(output)?);
+    let to_mm3_per_s = in_mm3_per_s(output, &came)?;
+    let rows = Rows { table: &table, name: &name, columns };
+    let [command, mut flow] = series(args, &rows, [input, output])?;
+    flow.values.iter_mut().for_each(|value| *value *= to_mm3_per_s);
+    Ok(StartLogs { source: name.clone(), input: told, output: came, command, flow })
+}
+
+/// What a flow is multiplied by to be in mm³/s.
+fn in_mm3_per_s(column: &str, quantity: &Quantity) -> Result<f64, WrongArguments> {
+    let found = quantity.unit;
+    let hint = match found {
+        Unit::Mm3PerS => return Ok(1.0),
+        Unit::LPerMin => return Ok(MM3_PER_S_PER_L_PER_MIN),
+        Unit::GPerMin | Unit::KgPerS => {
+            "; divide the mass by the density of the melt: the void is a volume"
+        }
+        _ => "",
+    };
+    Err(WrongArguments::new(format!(
+        "--output {column}: found {found}, expected a flow in mm³/s or l/min{hint} (--unit \
+         {column}=mm3_per_s tells another unit)"
+    )))
+}
+
+/// Two columns of a table at their moments.
+fn series(args: &StartsArgs, rows: &Rows<'_>, names: [&str; 2]) -> Result<[Series; 2]> {
+    let (columns, table): (_, &Table) = (&args.columns, rows.table);
+    let (time, unit_s) = columns.time(table.names())?;
+    let mut time_s: Vec<f64> = rows.column(&time)?.iter().map(|at| at * unit_s).collect();
+    let [input, output] = names;
+    let (mut command, mut flow) = (rows.column(input)?, rows.column(output)?);
+    let first = columns.cut(&mut time_s, &mut command, &mut flow);
+    let rules = Rules { max_gap_s: None, time_is_told: columns.told(&time).is_some() };
+    check_time(&time_s, &rules).map_err(|error| at_line(table, first, rows.name, error))?;
+    let made = |name: &str, is_held, values| Series {
+        name: name.to_owned(),
+        time_s: time_s.clone(),
+        values,
+        is_held,
+    };
+    Ok([made(input, true, command), made(output, false, flow)])
+}

@@ -1,0 +1,143 @@
+//! A cell that runs: from what was loaded to the run's report.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use anyhow::Context;
+
+use super::arguments::{WrongArguments, refuse_a_recording_in};
+use super::outcome;
+use super::print::{Voice, warn};
+use crate::assembly::{LoadedCell, beyond};
+use crate::cell::file::RunPart;
+use crate::core::time::Span;
+use crate::io::clock::RunClock;
+use crate::io::record::{ExtruderFile, RecordConfig};
+use crate::io::stop::StopSignal;
+use crate::live::{self, LiveExtruder, LiveReport, LiveRun};
+use crate::report::run::RunPage;
+use crate::rows::log::{ControlFacts, LogOptions};
+use crate::width_control::target::Target;
+
+/// Runs a cell that has been loaded, into a folder, and tells how it went.
+pub fn drive(
+    loaded: LoadedCell,
+    out: &Path,
+    title: String,
+    duration_s: Option<f64>,
+    clock: RunClock,
+    voice: Voice,
+) -> anyhow::Result<ExitCode> {
+    let max_rejected_share = loaded.cell.recording.max_rejected_share;
+    let until = Until { duration_s, ends_with_steps: false };
+    let report = live(loaded, Folders { recording: out, log: out }, title, until, clock, voice)?;
+    Ok(outcome::tell(&report, out, max_rejected_share))
+}
+
+/// What ends a run besides the operator.
+#[derive(Debug, Clone, Copy)]
+pub struct Until {
+    /// This time \[s\].
+    pub duration_s: Option<f64>,
+    /// The end of a course of steps.
+    pub ends_with_steps: bool,
+}
+
+/// Where a run leaves its files.
+#[derive(Debug, Clone, Copy)]
+pub struct Folders<'a> {
+    /// Its recording.
+    pub recording: &'a Path,
+    /// Its tables and its report.
+    pub log: &'a Path,
+}
+
+/// Runs a cell that has been loaded, with its recording in one folder and its log in
+/// another, or the same.
+pub fn live(
+    loaded: LoadedCell,
+    folders: Folders<'_>,
+    title: String,
+    until: Until,
+    clock: RunClock,
+    voice: Voice,
+) -> anyhow::Result<LiveReport> {
+    refuse_a_recording_in(folders.recording)?;
+    let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
+    let (extruder, extruder_files) = live_extruder(&loaded, &run)?;
+    let stop = StopSignal::install().context("cannot wait for signals")?;
+    let log = RunPage::log(LogOptions {
+        folder: folders.log.to_owned(),
+        title,
+        about: about(&loaded, &run, extruder.as_ref()),
+        gauge: loaded.cell.gauge,
+        target: loaded.cell.target.as_ref().map(Target::nominal),
+        max_rejected_share: loaded.cell.recording.max_rejected_share,
+        control: Some(ControlFacts::of(&run, extruder.as_ref().map(|side| &side.setup.law))),
+    })?;
+    let record = RecordConfig {
+        frames: loaded.cell.recording.frames,
+        epoch_ns: clock.epoch_unix_ns(),
+        cell_name: loaded.path.display().to_string(),
+        cell_text: loaded.text.clone(),
+        calibration_text: loaded.calibration_text.clone(),
+        extruder_files,
+    };
+    let quiet = voice.quiet;
+    Ok(live::run(LiveRun {
+        run,
+        extruder,
+        calibration: loaded.calibration,
+        clock,
+        out: folders.recording.to_owned(),
+        record,
+        log,
+        duration: until.duration_s.map(Span::from_secs),
+        ends_with_steps: until.ends_with_steps,
+        stop: stop.told().clone(),
+        notice: Box::new(move |line| {
+            if !quiet {
+                tell!("{line}");
+            }
+        }),
+        cell: loaded.cell.clone(),
+    })?)
+}
+
+/// What stands at the head of the report.
+fn about(
+    loaded: &LoadedCell,
+    run: &RunPart,
+    extruder: Option<&LiveExtruder>,
+) -> Vec<(String, String)> {
+    let mut about = vec![
+        ("cell".into(), loaded.path.display().to_string()),
+        ("camera".into(), run.camera.source_name.clone()),
+        ("robot".into(), run.robot.address.clone()),
+    ];
+    about.extend(extruder.map(|side| ("extruder".into(), side.link.address.clone())));
+    about.push(("calibration".into(), loaded.calibration_words()));
+    about
+}
+
+/// The extruder side of a live run and the files behind it; none
+/// where the cell has none. Refuses an extruder that nothing says how to reach.
+fn live_extruder(
+    loaded: &LoadedCell,
+    run: &RunPart,
+) -> anyhow::Result<(Option<LiveExtruder>, Vec<ExtruderFile>)> {
+    let (Some(part), Some(side)) = (&run.extruder, loaded.extruder()?) else {
+        return Ok((None, Vec::new()));
+    };
+    let Some(link) = part.extruder.link.clone() else {
+        return Err(WrongArguments::new(format!(
+            "{}: extruder.driver: found nothing, expected \"line\" and an address: a live run \
+             has to reach its extruder (truebead simulate needs neither)",
+            loaded.path.display()
+        ))
+        .into());
+    };
+    warn(&side.warnings);
+    warn(beyond(part, &side)?.as_slice());
+    Ok((Some(LiveExtruder { setup: side.setup, demand: part.demand, link }), side.files))
+}

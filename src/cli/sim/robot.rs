@@ -1,0 +1,160 @@
+//! `truebead sim robot`: a robot controller that answers the robot link.
+
+use std::net::TcpListener;
+
+use anyhow::Context;
+use clap::Args;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use crate::cli::arguments::WrongArguments;
+use crate::core::time::{Span, Stamp};
+use crate::core::units::{Mm, MmPerS, MmPerS2, NotFinite};
+use crate::io::clock::RunClock;
+use crate::link::{Job, RobotParams};
+use crate::simulators::robot::{RobotSim, SimError, SimOptions};
+
+/// A robot that answers the robot link.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  truebead sim robot
+  truebead sim robot --bead-mm 2000 --layers 4 --layer-height-mm 20
+  truebead sim robot --listen 0.0.0.0:5653 --endless --bandwidth-hz 3
+
+It has a velocity loop, speed limits of its own, and setpoints that run out. A bead begins when a PC is connected, after the pause. A second PC replaces the
+first. A new connection stands for the operator's key: it begins the job again
+once it was finished, and acknowledges a STOP or FAULT that it finds.
+
+To be the PC by hand: nc 127.0.0.1 5653, and HELLO 1 me as the first line.
+robot/PROTOCOL.md has the rest.")]
+pub struct RobotSimArgs {
+    /// Address and port on which the robot listens
+    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:5653")]
+    listen: String,
+    /// Its name, one word
+    #[arg(long, default_value = "truebead-sim", value_parser = parse_name)]
+    name: String,
+    /// Slowest setpoint that it takes [mm/s]
+    #[arg(long, value_name = "MM/S", default_value = "60", value_parser = parse_speed,
+          allow_hyphen_values = true)]
+    min: MmPerS,
+    /// Fastest setpoint that it takes [mm/s]
+    #[arg(long, value_name = "MM/S", default_value = "150", value_parser = parse_speed,
+          allow_hyphen_values = true)]
+    max: MmPerS,
+    /// Speed to which it goes when setpoints run out [mm/s]
+    #[arg(long, value_name = "MM/S", default_value = "60", value_parser = parse_speed,
+          allow_hyphen_values = true)]
+    hold: MmPerS,
+    /// Speed at which it begins a bead [mm/s]
+    #[arg(long, value_name = "MM/S", default_value = "112.5", value_parser = parse_speed,
+          allow_hyphen_values = true)]
+    start: MmPerS,
+    /// Bandwidth of its velocity loop [Hz]
+    #[arg(long, value_name = "HZ", default_value = "10", allow_hyphen_values = true)]
+    bandwidth_hz: f64,
+    /// Largest acceleration along the path [mm/s²]
+    #[arg(long, value_name = "MM/S2", default_value = "2000", value_parser = parse_accel,
+          allow_hyphen_values = true)]
+    accel: MmPerS2,
+    /// Length of a bead, after which it is IDLE [mm]
+    #[arg(long, value_name = "MM", default_value = "2000", value_parser = parse_length,
+          allow_hyphen_values = true)]
+    bead_mm: Mm,
+    /// Lays one bead without end
+    #[arg(long, conflicts_with_all = ["bead_mm", "layers"])]
+    endless: bool,
+    /// How many beads it lays, one above the other
+    #[arg(long, value_name = "N", default_value = "1")]
+    layers: u32,
+    /// By how much each bead lies above the one before [mm]
+    #[arg(long, value_name = "MM", default_value = "20", value_parser = parse_layer,
+          allow_hyphen_values = true)]
+    layer_height_mm: Mm,
+    /// Pause before each bead [s]
+    #[arg(long, value_name = "S", default_value = "1", value_parser = parse_pause,
+          allow_hyphen_values = true)]
+    pause_s: Span,
+    /// Time between two STATE lines [ms]
+    #[arg(long, value_name = "MS", default_value = "20",
+          value_parser = clap::value_parser!(u32).range(20..=200))]
+    state_ms: u32,
+}
+
+/// Runs the robot until SIGINT or SIGTERM. Fails where it cannot listen, and
+/// with [`WrongArguments`] where the robot that was described cannot be.
+pub fn run(args: &RobotSimArgs) -> anyhow::Result<()> {
+    let listener = TcpListener::bind(&args.listen).with_context(|| {
+        format!("cannot listen on {}; name a free address with --listen", args.listen)
+    })?;
+    // Before the robot answers, so that no signal falls between.
+    let mut signals = Signals::new([SIGINT, SIGTERM]).context("cannot wait for signals")?;
+    let sim = match RobotSim::spawn(listener, RunClock::start(), options(args), Box::new(print)) {
+        Ok(sim) => sim,
+        Err(SimError::Params(error)) => return Err(WrongArguments::new(error).into()),
+        Err(error) => return Err(error.into()),
+    };
+    tell!("robot `{}` listens on {}; Ctrl-C ends it", args.name, sim.local_addr());
+    signals.forever().next();
+    sim.stop();
+    tell!("ended");
+    Ok(())
+}
+
+fn options(args: &RobotSimArgs) -> SimOptions {
+    let params = RobotParams {
+        name: args.name.clone(),
+        min: args.min,
+        max: args.max,
+        hold: args.hold,
+        start: args.start,
+        bandwidth_hz: args.bandwidth_hz,
+        accel: args.accel,
+        bead: (!args.endless).then_some(args.bead_mm),
+        ..RobotParams::default()
+    };
+    let layers = if args.endless { 1 } else { args.layers };
+    let job = Job::new(layers, args.layer_height_mm, params.z, args.pause_s);
+    SimOptions { params, job, state_period: Span::from_millis(i64::from(args.state_ms)) }
+}
+
+fn print(at: Stamp, text: &str) {
+    tell!("{:9.3} s  {text}", at.secs());
+}
+
+fn parse_name(text: &str) -> Result<String, String> {
+    let one_word = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_graphic());
+    if one_word { Ok(text.to_owned()) } else { Err("expected one word of ASCII".to_owned()) }
+}
+
+fn parse<T>(text: &str, unit: impl Fn(f64) -> Result<T, NotFinite>) -> Result<T, String> {
+    let number = text.parse().map_err(|_| "expected a number".to_owned())?;
+    unit(number).map_err(|error| error.to_string())
+}
+
+fn parse_speed(text: &str) -> Result<MmPerS, String> {
+    parse(text, MmPerS::new)
+}
+
+fn parse_accel(text: &str) -> Result<MmPerS2, String> {
+    parse(text, MmPerS2::new)
+}
+
+fn parse_length(text: &str) -> Result<Mm, String> {
+    parse(text, Mm::new)
+}
+
+fn parse_layer(text: &str) -> Result<Mm, String> {
+    parse_length(text)
+        .ok()
+        .filter(|height| *height >= Mm::ZERO)
+        .ok_or_else(|| "expected 0 mm or more".to_owned())
+}
+
+fn parse_pause(text: &str) -> Result<Span, String> {
+    match text.parse::<f64>() {
+        Ok(secs) if (0.0..=3600.0).contains(&secs) => Ok(Span::from_secs(secs)),
+        _ => Err("expected 0 to 3600 seconds".to_owned()),
+    }
+}

@@ -1,0 +1,56 @@
+//! What a simulated cell is made of besides its file: its extruder and its recorder.
+
+use std::path::PathBuf;
+
+use super::print::warn;
+use crate::assembly::LoadedCell;
+use crate::cell::file::KeepFrames;
+use crate::control::event::Event;
+use crate::control::step::Step;
+use crate::core::time::Stamp;
+use crate::io::record::{self, RecordConfig, RecorderHandle};
+use crate::run::ports::{RecordError, Recorder};
+use crate::sim::cell::Rig;
+
+/// The extruder side of a simulated cell, with what is to be said about it.
+pub fn simulated_extruder(loaded: &LoadedCell) -> anyhow::Result<Option<Rig>> {
+    let side = loaded.simulated_extruder()?;
+    if let Some(side) = &side {
+        warn(&side.warnings);
+    }
+    Ok(side.map(|side| side.rig))
+}
+
+/// Keeps what happened, where that is asked for.
+pub struct SimRecorder(Option<RecorderHandle>);
+
+impl SimRecorder {
+    /// Into a folder, if one is given.
+    pub fn of(folder: Option<&PathBuf>, loaded: &LoadedCell) -> anyhow::Result<Self> {
+        let Some(folder) = folder else { return Ok(Self(None)) };
+        let config = RecordConfig {
+            frames: KeepFrames::None,
+            epoch_ns: 0,
+            cell_name: loaded.path.display().to_string(),
+            cell_text: loaded.text.clone(),
+            calibration_text: loaded.calibration_text.clone(),
+            extruder_files: loaded.extruder()?.map_or_else(Vec::new, |side| side.files),
+        };
+        let (recorder, _) = record::start(&config, folder)?;
+        Ok(Self(Some(recorder.waiting())))
+    }
+
+    /// Gives the recording its name.
+    pub fn finish(self) -> anyhow::Result<()> {
+        if let Some(recorder) = self.0 {
+            recorder.finish()?;
+        }
+        Ok(())
+    }
+}
+
+impl Recorder for SimRecorder {
+    fn record(&mut self, now: Stamp, event: &Event, step: &Step) -> Result<(), RecordError> {
+        self.0.as_mut().map_or(Ok(()), |recorder| recorder.record(now, event, step))
+    }
+}

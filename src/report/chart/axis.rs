@@ -1,0 +1,164 @@
+//! Axes: round ticks, and from values to places on the page.
+
+use super::range::Range;
+
+/// Where an axis begins and ends on the page \[px of the drawing\]; upwards it begins at
+/// the larger number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Where its smallest value stands.
+    pub from: f64,
+    /// Where its largest value stands.
+    pub to: f64,
+}
+
+/// A linear or logarithmic map from values to a stretch of the page.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    low: f64,
+    high: f64,
+    from: f64,
+    to: f64,
+    log: bool,
+}
+
+impl Scale {
+    /// Values onto a part of the page. A range without extent is widened.
+    pub fn linear(values: Range, page: Extent) -> Self {
+        let (low, high) = widened(values.min, values.max);
+        let Extent { from, to } = page;
+        Self { low, high, from, to, log: false }
+    }
+
+    /// The same for positive values on a logarithmic axis.
+    pub fn log(values: Range, page: Extent) -> Self {
+        let low = values.min.max(1e-9);
+        let high = if values.max > low { values.max } else { low * 2.0 };
+        let Extent { from, to } = page;
+        Self { low, high, from, to, log: true }
+    }
+
+    /// The place of a value on the page.
+    pub fn place(&self, value: f64) -> f64 {
+        let share = if self.log {
+            (value.max(1e-9) / self.low).ln() / (self.high / self.low).ln()
+        } else {
+            (value - self.low) / (self.high - self.low)
+        };
+        self.from + share * (self.to - self.from)
+    }
+
+    /// Smallest and largest value.
+    pub fn range(&self) -> Range {
+        Range::new(self.low, self.high)
+    }
+
+    /// Round values within the range, about `wanted` of them, with their
+    /// labels.
+    pub fn ticks(&self, wanted: u32) -> Vec<(f64, String)> {
+        if self.log { self.log_ticks() } else { self.linear_ticks(wanted) }
+    }
+
+    fn linear_ticks(&self, wanted: u32) -> Vec<(f64, String)> {
+        let step = round_step((self.high - self.low) / f64::from(wanted.max(1)));
+        let places = places(step);
+        let mut ticks = Vec::new();
+        let mut index = (self.low / step - 1e-9).ceil();
+        while index * step <= self.high + step * 1e-9 && ticks.len() < 100 {
+            // Adding zero turns a negative zero into a positive one.
+            let value = index * step + 0.0;
+            ticks.push((value, format!("{value:.places$}")));
+            index += 1.0;
+        }
+        ticks
+    }
+
+    fn log_ticks(&self) -> Vec<(f64, String)> {
+        let factors: &[f64] = match self.high / self.low {
+            narrow if narrow < 10.0 => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0],
+            wide if wide < 1e3 => &[1.0, 2.0, 5.0],
+            _ => &[1.0],
+        };
+        let mut ticks = Vec::new();
+        let mut decade = 10_f64.powf(self.low.log10().floor());
+        while decade <= self.high && ticks.len() < 100 {
+            for factor in factors {
+                let value = decade * factor;
+                if (self.low..=self.high).contains(&value) {
+                    let halves = usize::from(factor.fract() > 0.0);
+                    ticks.push((value, format!("{value:.*}", places(value) + halves)));
+                }
+            }
+            decade *= 10.0;
+        }
+        ticks
+    }
+}
+
+fn widened(low: f64, high: f64) -> (f64, f64) {
+    let least = (low.abs().max(high.abs()) * 1e-6).max(1e-6);
+    if high - low > least {
+        (low, high)
+    } else {
+        let middle = f64::midpoint(low, high);
+        let half = (middle.abs() * 0.01).max(0.5);
+        (middle - half, middle + half)
+    }
+}
+
+/// 1, 2 or 5 times a power of ten, not below `rough`.
+fn round_step(rough: f64) -> f64 {
+    let power = 10_f64.powf(rough.max(1e-12).log10().floor());
+    let factor = rough / power;
+    let round = [1.0, 2.0, 5.0].into_iter().find(|round| factor <= round + 1e-9);
+    power * round.unwrap_or(10.0)
+}
+
+/// Decimals that a step of this size needs.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=9")]
+fn places(step: f64) -> usize {
+    (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(scale: Scale, wanted: u32) -> Vec<String> {
+        scale.ticks(wanted).into_iter().map(|tick| tick.1).collect()
+    }
+
+    #[test]
+    fn ticks_are_round() {
+        let page = Extent { from: 0.0, to: 100.0 };
+        assert_eq!(
+            labels(Scale::linear(Range::new(0.0, 20.0), page), 5),
+            ["0", "5", "10", "15", "20"]
+        );
+        assert_eq!(
+            labels(Scale::linear(Range::new(41.83, 42.21), page), 4),
+            ["41.9", "42.0", "42.1", "42.2"]
+        );
+        assert_eq!(labels(Scale::linear(Range::new(-0.5, 0.5), page), 2), ["-0.5", "0.0", "0.5"]);
+        assert_eq!(labels(Scale::log(Range::new(0.3, 6.0), page), 5), ["0.5", "1", "2", "5"]);
+        assert_eq!(labels(Scale::log(Range::new(0.9, 3.1), page), 5), ["1", "1.5", "2", "3"]);
+    }
+
+    #[test]
+    fn a_range_without_extent_still_has_an_axis() {
+        let scale = Scale::linear(Range::new(42.0, 42.0), Extent { from: 0.0, to: 100.0 });
+        assert!((scale.place(42.0) - 50.0).abs() < 1e-9);
+        assert!(!scale.ticks(5).is_empty());
+        assert!(
+            !Scale::log(Range::new(0.0, 0.0), Extent { from: 0.0, to: 1.0 }).place(0.0).is_nan()
+        );
+    }
+
+    #[test]
+    fn values_have_their_place() {
+        let scale = Scale::linear(Range::new(0.0, 10.0), Extent { from: 200.0, to: 100.0 });
+        assert!((scale.place(2.5) - 175.0).abs() < 1e-9);
+        let log = Scale::log(Range::new(1.0, 100.0), Extent { from: 0.0, to: 100.0 });
+        assert!((log.place(10.0) - 50.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,46 @@
+//! How latencies are distributed, on a logarithmic axis.
+
+use maud::{Markup, html};
+
+use super::area::{Area, round};
+use super::axis::{Extent, Scale};
+use super::palette;
+use super::range::Range;
+use crate::numeric::statistics::{Distribution, as_f64};
+
+const BARS_PER_OCTAVE: usize = 8;
+
+/// Bars of counts over milliseconds, with lines at the median and at 99 %.
+pub fn draw(latencies: &Distribution) -> Markup {
+    let bars = latencies.bars(BARS_PER_OCTAVE);
+    let (Some(first), Some(last)) = (bars.first(), bars.last()) else { return html! {} };
+    let area = Area::wide(230.0);
+    let x = Scale::log(Range::new(first.0.min(last.1 / 4.0), last.1), area.across());
+    let most = bars.iter().map(|bar| bar.2).max().unwrap_or(1);
+    let y = Scale::linear(Range::new(0.0, as_f64(most) * 1.12), area.upwards());
+    let Extent { from: bottom, to: top } = area.upwards();
+    let inner = html! {
+        (area.y_grid(&y, "setpoints"))
+        (area.vertical_grid(&x.ticks(0), &x, "latency [ms]"))
+        @for (low, high, count) in &bars {
+            @let (from, to) = (x.place(*low), x.place(*high));
+            @let upper = y.place(as_f64(*count));
+            @if *count > 0 {
+                rect x=(round(from + 0.5)) y=(round(upper)) width=(round((to - from - 1.0).max(0.5)))
+                    height=(round((bottom - upper).max(1.0))) fill=(palette::SETPOINT.css()) {
+                    title { (format!("{low:.2} to {high:.2} ms: {count}")) }
+                }
+            }
+        }
+        @for (name, q, row) in [("median", 0.5, 12.0), ("99 %", 0.99, 30.0)] {
+            @if let Some(value) = latencies.quantile(q) {
+                @let at = round(x.place(value));
+                line.level x1=(at) x2=(at) y1=(top) y2=(bottom) stroke=(palette::TARGET.css()) {}
+                text.label x=(at - 5.0) y=(top + row) text-anchor="end" {
+                    (name) " " (format!("{value:.2} ms"))
+                }
+            }
+        }
+    };
+    area.svg("how the latencies are distributed", &inner)
+}

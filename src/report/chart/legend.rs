@@ -1,0 +1,68 @@
+//! What the colours of a plot mean, of what is drawn and nothing else.
+
+use maud::{Markup, html};
+
+use super::palette;
+use super::palette::Ink;
+use super::series::Series;
+use super::strip::Strip;
+
+/// Name, colour and kind of line ("", "dash", "area", "block" or "dot").
+pub type Entry<'a> = (&'a str, Ink, &'a str);
+
+/// All of the entries.
+pub fn legend(entries: &[Entry<'_>]) -> Markup {
+    html! {
+        div.legend { @for (name, ink, kind) in entries {
+            @let property = if matches!(*kind, "" | "dash") { "border-color" } else { "background" };
+            span { i class=(kind) style=(format!("{property}:{}", ink.css())) {} (name) }
+        } }
+    }
+}
+
+/// The entries whose series has something to draw.
+pub fn drawn<'a>(entries: &[(&Series, Entry<'a>)]) -> Vec<Entry<'a>> {
+    let drawn = entries.iter().filter(|(series, _)| !series.is_empty());
+    drawn.map(|(_, entry)| *entry).collect()
+}
+
+/// The states that a strip shows, and whether a limit acted.
+pub fn of_strips(names: &[&'static str], states: &Strip, limits: &Strip) -> Markup {
+    let shown = |name: &str| states.spells().iter().any(|spell| spell.mark.name == name);
+    let drawn = names.iter().filter(|name| shown(name));
+    let mut entries: Vec<Entry<'_>> =
+        drawn.filter_map(|name| Some((*name, palette::state(name)?, "block"))).collect();
+    if has_marks(limits) {
+        entries.push(("a limit acts", palette::LIMIT, "block"));
+    }
+    legend(&entries)
+}
+
+/// Whether a strip shows anything worth drawing.
+pub fn has_marks(strip: &Strip) -> bool {
+    strip.spells().iter().any(|spell| spell.mark.severity > 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::chart::strip::Mark;
+
+    #[test]
+    fn what_is_not_drawn_is_not_named() {
+        let (mut some, none) = (Series::default(), Series::default());
+        some.push(0.0, 1.0);
+        let entry = |name| (name, palette::SPEED, "");
+        let named = drawn(&[(&some, entry("robot")), (&none, entry("demand"))]);
+        assert_eq!(named.iter().map(|entry| entry.0).collect::<Vec<_>>(), ["robot"]);
+        let (mut states, mut limits) = (Strip::default(), Strip::default());
+        states.push(0.0, Mark { severity: 1, name: "running" });
+        limits.push(0.0, Mark { severity: 0, name: "none" });
+        let names = ["off", "running", "fault"];
+        let text = of_strips(&names, &states, &limits).into_string();
+        assert!(text.contains("running") && !text.contains("fault"), "{text}");
+        assert!(!text.contains("a limit acts"), "{text}");
+        limits.push(1.0, Mark { severity: 1, name: "rise" });
+        assert!(of_strips(&names, &states, &limits).into_string().contains("a limit acts"));
+    }
+}

@@ -1,0 +1,199 @@
+//! A curve of any length in bounded memory: neighbouring samples share a
+//! bucket that keeps their smallest and their largest, so that no spike is
+//! lost.
+
+use super::range::Range;
+
+/// A point of a curve, in the units of its axes.
+pub type Point = (f64, f64);
+
+/// Buckets that are kept; each gives up to two points.
+const MAX_BUCKETS: usize = 1000;
+
+/// The extremes of some neighbouring samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Bucket {
+    low: Point,
+    high: Point,
+    first_x: f64,
+    last_x: f64,
+    count: u64,
+}
+
+impl Bucket {
+    fn of(point: Point) -> Self {
+        Self { low: point, high: point, first_x: point.0, last_x: point.0, count: 1 }
+    }
+
+    fn join(self, later: Self) -> Self {
+        Self {
+            low: if later.low.1 < self.low.1 { later.low } else { self.low },
+            high: if later.high.1 > self.high.1 { later.high } else { self.high },
+            first_x: self.first_x,
+            last_x: later.last_x,
+            count: self.count + later.count,
+        }
+    }
+}
+
+/// Samples in the order of their coming, thinned by doubling buckets.
+#[derive(Debug, Clone)]
+pub struct Series {
+    buckets: Vec<Bucket>,
+    per_bucket: u64,
+}
+
+impl Default for Series {
+    fn default() -> Self {
+        Self { buckets: Vec::new(), per_bucket: 1 }
+    }
+}
+
+impl Series {
+    /// Takes a sample; one that is not finite is left out. x that falls begins
+    /// anew, as a path does with a new bead.
+    pub fn push(&mut self, x: f64, y: f64) {
+        if !(x.is_finite() && y.is_finite()) {
+            return;
+        }
+        let sample = Bucket::of((x, y));
+        match self.buckets.last_mut() {
+            Some(last) if last.count < self.per_bucket && x >= last.last_x => {
+                *last = last.join(sample);
+            }
+            _ => self.buckets.push(sample),
+        }
+        if self.buckets.len() > MAX_BUCKETS {
+            self.per_bucket *= 2;
+            self.buckets = self
+                .buckets
+                .chunks(2)
+                .map(|pair| pair.iter().copied().reduce(Bucket::join).unwrap_or(pair[0]))
+                .collect();
+        }
+    }
+
+    /// Whether there is nothing to draw.
+    pub fn is_empty(&self) -> bool {
+        self.buckets.is_empty()
+    }
+
+    /// The curve, with both extremes of every bucket; at most 2000 points.
+    pub fn points(&self) -> Vec<Point> {
+        let mut points = Vec::with_capacity(self.buckets.len() * 2);
+        for bucket in &self.buckets {
+            if bucket.count == 1 {
+                points.push(bucket.low);
+            } else if bucket.low.0 <= bucket.high.0 {
+                points.extend([bucket.low, bucket.high]);
+            } else {
+                points.extend([bucket.high, bucket.low]);
+            }
+        }
+        points
+    }
+
+    /// The smallest of every bucket, at its middle.
+    pub fn lower_envelope(&self) -> Vec<Point> {
+        self.buckets.iter().map(|b| (f64::midpoint(b.first_x, b.last_x), b.low.1)).collect()
+    }
+
+    /// The largest of every bucket, at its middle.
+    pub fn upper_envelope(&self) -> Vec<Point> {
+        self.buckets.iter().map(|b| (f64::midpoint(b.first_x, b.last_x), b.high.1)).collect()
+    }
+
+    /// Smallest and largest value.
+    pub fn range(&self) -> Option<Range> {
+        self.buckets
+            .iter()
+            .map(|bucket| Range::new(bucket.low.1, bucket.high.1))
+            .reduce(Range::joined)
+    }
+
+    /// Smallest and largest x.
+    pub fn extent(&self) -> Option<Range> {
+        self.buckets
+            .iter()
+            .map(|bucket| Range::new(bucket.first_x, bucket.last_x))
+            .reduce(Range::joined)
+    }
+}
+
+/// Where points that belong together end: the curve breaks where x falls or
+/// leaps over five times its usual step.
+pub fn unbroken(points: &[Point]) -> Vec<&[Point]> {
+    let mut steps: Vec<f64> =
+        points.windows(2).map(|pair| pair[1].0 - pair[0].0).filter(|step| *step > 0.0).collect();
+    steps.sort_by(f64::total_cmp);
+    // The two extremes of a bucket may lie close together, so the usual step
+    // is looked for among the larger ones.
+    let leap = steps.get(steps.len() * 3 / 4).map_or(f64::INFINITY, |step| step * 5.0);
+    points
+        .chunk_by(|a, b| (0.0..=leap).contains(&(b.0 - a.0)))
+        .filter(|part| !part.is_empty())
+        .collect()
+}
+
+/// Points as a curve that can be drawn.
+impl FromIterator<Point> for Series {
+    fn from_iter<I: IntoIterator<Item = Point>>(points: I) -> Self {
+        let mut series = Self::default();
+        for (x, y) in points {
+            series.push(x, y);
+        }
+        series
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_short_curve_is_kept_as_it_is() {
+        let mut series = Series::default();
+        for point in [(0.0, 1.0), (1.0, 5.0), (2.0, f64::NAN), (3.0, 2.0)] {
+            series.push(point.0, point.1);
+        }
+        assert_eq!(series.points(), [(0.0, 1.0), (1.0, 5.0), (3.0, 2.0)]);
+        assert_eq!(series.range(), Some(Range::new(1.0, 5.0)));
+        assert_eq!(series.extent(), Some(Range::new(0.0, 3.0)));
+    }
+
+    #[test]
+    fn a_lone_spike_survives_a_million_samples() {
+        let mut series = Series::default();
+        for i in 0..1_000_000_u32 {
+            let y = if i == 654_321 { 99.0 } else { f64::from(i % 7) };
+            series.push(f64::from(i), y);
+        }
+        let points = series.points();
+        assert!(points.len() <= 2000, "{}", points.len());
+        assert!(points.contains(&(654_321.0, 99.0)));
+        assert!(points.windows(2).all(|pair| pair[0].0 <= pair[1].0));
+    }
+
+    #[test]
+    fn curves_break_at_gaps_and_at_a_new_bead() {
+        let points: Vec<Point> =
+            [0.0, 1.0, 2.0, 20.0, 21.0, 3.0, 4.0].iter().map(|x| (*x, 0.0)).collect();
+        let lengths: Vec<usize> = unbroken(&points).iter().map(|part| part.len()).collect();
+        assert_eq!(lengths, [3, 2, 2]);
+    }
+
+    proptest! {
+        #[test]
+        fn extremes_are_kept(values in prop::collection::vec(-1e6..1e6, 1..5000)) {
+            let mut series = Series::default();
+            for (i, y) in (0_u32..).zip(&values) {
+                series.push(f64::from(i), *y);
+            }
+            let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+            let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            prop_assert_eq!(series.range(), Some(Range::new(least, largest)));
+            prop_assert!(series.points().len() <= 2000);
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! What the person who sets up light and lens can do better, in words, from how
+//! good the pictures of a run were.
+//!
+//! The scale is the bound: the scatter of widths grows with noise over contrast
+//! and with the root of the blur (ACCURACY.md, "The two bounds"). A picture is
+//! held against one with 80 grey levels of contrast, 4 of noise and a blur of
+//! 1.5 px, for which the table of accuracy holds.
+
+use super::image_quality::HintSummary;
+
+const CONTRAST_GREY: f64 = 80.0;
+const NOISE_GREY: f64 = 4.0;
+const BLUR_PX: f64 = 1.5;
+/// Advice is given where it would make widths surer by this factor.
+const WORTH: f64 = 1.5;
+/// Contrast below which shadows, stains and texture of a few grey levels bend
+/// an edge, whatever the noise.
+const FAINT_GREY: f64 = 25.0;
+/// Blur up to which the limits of accuracy are held.
+const SOFT_PX: f64 = 3.2;
+/// Blur, the pixels' own included, below which an edge falls between pixels.
+const SHARP_PX: f64 = 0.55;
+/// Two steps are told apart from so many blurs on.
+const APART: f64 = 4.0;
+/// Saturated share of the gauge from which the bead itself is cut off: noise
+/// alone does that where the bead is two of its standard deviations below the
+/// end of the scale.
+const CUT_OFF_SHARE: f64 = 0.01;
+/// Share of the rows below which something covers the edges.
+const COVERED_SHARE: f64 = 0.9;
+/// Offset of widths by skewed flanks that is worth a word \[px\], and the standard
+/// deviations by which it has to be sure: one run in 10,000 without a skew has as much.
+const SKEWED_PX: f64 = 0.05;
+const SKEW_SIGMAS: f64 = 4.0;
+
+/// One sentence for each thing to improve, the worst for the width first; none
+/// where nothing is known.
+pub fn advice(hints: &HintSummary) -> Vec<String> {
+    let mut advice = Vec::new();
+    advice.extend(hints.saturated_share_mean.and_then(on_saturation));
+    let known = |value: Option<f64>| value.filter(|value| *value > 0.0);
+    let (contrast, noise) = (known(hints.contrast_median_grey), known(hints.noise_median_grey));
+    if let (Some(contrast), Some(noise)) = (contrast, noise) {
+        advice.extend(on_contrast(contrast, noise));
+        advice.extend(on_noise(contrast, noise));
+    }
+    advice.extend(known(hints.blur_median_px).and_then(on_blur));
+    advice.extend(hints.used_share_mean.and_then(on_rows));
+    let skew = hints.skew_offset_px.zip(hints.skew_offset_sigma_px);
+    advice.extend(skew.and_then(|(offset, sigma)| on_skew(offset, sigma)));
+    advice
+}
+
+/// Smallest possible standard deviation of an edge in one row \[px\].
+pub fn row_bound_px(hints: &HintSummary) -> Option<f64> {
+    let (contrast, noise) = (hints.contrast_median_grey?, hints.noise_median_grey?);
+    let blur = hints.blur_median_px?;
+    let root = (2.0 * std::f64::consts::PI.sqrt()).sqrt();
+    (contrast > 0.0 && blur > 0.0).then(|| root * noise / contrast * blur.sqrt())
+}
+
+fn on_saturation(share: f64) -> Option<String> {
+    (share > CUT_OFF_SHARE).then(|| {
+        format!(
+            "{:.0} % of the gauge's pixels are saturated: shorten the exposure, or turn the light \
+             out of the mirror direction. What is cut off moves the edges, and sigma does not \
+             know it.",
+            share * 100.0
+        )
+    })
+}
+
+/// How many times surer widths were with the reference's contrast and noise.
+fn lost(contrast: f64, noise: f64) -> f64 {
+    (noise / contrast) / (NOISE_GREY / CONTRAST_GREY)
+}
+
+fn on_contrast(contrast: f64, noise: f64) -> Option<String> {
+    let low = contrast < CONTRAST_GREY / WORTH && lost(contrast, noise) > WORTH;
+    (low || contrast < FAINT_GREY).then(|| {
+        format!(
+            "Contrast {contrast:.0} grey levels of 256: light the bead more from the side, or \
+             measure another colour channel. Twice the contrast halves the scatter of the widths, \
+             and what shadows and stains do to them."
+        )
+    })
+}
+
+fn on_noise(contrast: f64, noise: f64) -> Option<String> {
+    let by_contrast_alone = contrast < CONTRAST_GREY / WORTH && noise <= NOISE_GREY * WORTH;
+    (lost(contrast, noise) > WORTH && !by_contrast_alone).then(|| {
+        format!(
+            "Noise {noise:.1} grey levels: more light or a longer exposure in place of gain. Half \
+             the noise halves the scatter of the widths."
+        )
+    })
+}
+
+fn on_blur(blur: f64) -> Option<String> {
+    if blur < SHARP_PX {
+        return Some(format!(
+            "Blur {blur:.1} px: the lens is sharper than the pixels, so that the place of an edge \
+             within a pixel is not seen, and sigma is too small. Put it out of focus a little, to \
+             0.8 px or more."
+        ));
+    }
+    (blur > SOFT_PX).then(|| {
+        format!(
+            "Blur {blur:.1} px: refocus on the top edges of the bead, or shorten the exposure if \
+             it smears (torn edges look blurred in focus as well). At {BLUR_PX} px widths of a \
+             smooth bead would scatter {:.0} % less, and a shadow be told from an edge {:.0} px \
+             away, not only {:.0} px.",
+            (1.0 - (BLUR_PX / blur).sqrt()) * 100.0,
+            APART * BLUR_PX,
+            APART * blur
+        )
+    })
+}
+
+fn on_rows(share: f64) -> Option<String> {
+    (share < COVERED_SHARE).then(|| {
+        format!(
+            "Only {:.0} % of the rows show the edges: look at the pictures for grains, glare and \
+             shadows on them.",
+            share * 100.0
+        )
+    })
+}
+
+fn on_skew(offset: f64, sigma: f64) -> Option<String> {
+    let is_sure = offset.abs() > SKEWED_PX && offset.abs() > SKEW_SIGMAS * sigma;
+    is_sure.then(|| {
+        let way = if offset > 0.0 { "wide" } else { "narrow" };
+        format!(
+            "The flanks of the edges are skewed: widths look {:.2} ± {sigma:.2} px too {way} by that, \
+             which sigma contains only where a single frame shows it. Causes are a camera whose grey \
+             is not proportional to light (switch its gamma off, or give gamma in [gauge]), the rounded \
+             shoulders of a bead, or the soft border of a shadow beside it.",
+            offset.abs()
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hints(contrast: f64, noise: f64, blur: f64, saturated: f64, used: f64) -> HintSummary {
+        HintSummary {
+            contrast_median_grey: Some(contrast),
+            blur_median_px: Some(blur),
+            noise_median_grey: Some(noise),
+            saturated_share_mean: Some(saturated),
+            used_share_mean: Some(used),
+            skew_offset_px: Some(0.01),
+            skew_offset_sigma_px: Some(0.001),
+        }
+    }
+
+    fn begins(hints: &HintSummary, expected: &[&str]) {
+        let advice = advice(hints);
+        assert_eq!(advice.len(), expected.len(), "{advice:?}");
+        for (sentence, begin) in advice.iter().zip(expected) {
+            assert!(sentence.starts_with(begin), "{sentence} / {begin}");
+        }
+    }
+
+    #[test]
+    fn pictures_for_which_the_accuracy_holds_need_no_advice() {
+        begins(&hints(80.0, 4.0, 1.5, 0.0, 1.0), &[]);
+        begins(&hints(80.0, 4.0, 3.02, 0.0, 1.0), &[]);
+        begins(&hints(80.0, 4.0, 0.85, 0.0, 1.0), &[]);
+        // Little contrast, but even less noise.
+        begins(&hints(40.0, 0.5, 1.5, 0.0, 1.0), &[]);
+    }
+
+    #[test]
+    fn each_fault_has_its_remedy() {
+        begins(&hints(80.0, 4.0, 4.1, 0.0, 1.0), &["Blur 4.1 px: refocus"]);
+        begins(&hints(80.0, 4.0, 0.41, 0.0, 1.0), &["Blur 0.4 px: the lens is sharper"]);
+        begins(&hints(20.0, 2.0, 1.5, 0.0, 1.0), &["Contrast 20"]);
+        begins(&hints(20.0, 0.2, 1.5, 0.0, 1.0), &["Contrast 20"]);
+        begins(&hints(120.0, 12.0, 1.5, 0.0, 1.0), &["Noise 12.0"]);
+        begins(&hints(60.0, 5.5, 1.5, 0.0, 1.0), &["Noise 5.5"]);
+        begins(&hints(20.0, 8.0, 1.5, 0.0, 1.0), &["Contrast 20", "Noise 8.0"]);
+        begins(&hints(80.0, 4.0, 1.5, 0.12, 1.0), &["12 % of the gauge's pixels are saturated"]);
+        begins(&hints(80.0, 4.0, 1.5, 0.0, 0.7), &["Only 70 % of the rows"]);
+    }
+
+    #[test]
+    fn skewed_flanks_are_told_where_they_are_sure_and_matter() {
+        let skewed = |offset: f64, sigma: f64| HintSummary {
+            skew_offset_px: Some(offset),
+            skew_offset_sigma_px: Some(sigma),
+            ..hints(80.0, 4.0, 1.5, 0.0, 1.0)
+        };
+        begins(&skewed(0.4, 0.2), &[]);
+        begins(
+            &skewed(0.38, 0.04),
+            &["The flanks of the edges are skewed: widths look 0.38 ± 0.04 px too wide"],
+        );
+        begins(
+            &skewed(-0.3, 0.04),
+            &["The flanks of the edges are skewed: widths look 0.30 ± 0.04 px too narrow"],
+        );
+    }
+
+    #[test]
+    fn what_is_not_known_gives_no_advice() {
+        let nothing = HintSummary {
+            contrast_median_grey: None,
+            blur_median_px: None,
+            noise_median_grey: None,
+            saturated_share_mean: None,
+            used_share_mean: None,
+            skew_offset_px: None,
+            skew_offset_sigma_px: None,
+        };
+        begins(&nothing, &[]);
+        assert_eq!(row_bound_px(&nothing), None);
+        // The 2022 paper's method knows neither.
+        begins(&hints(0.0, 0.0, 0.0, 0.0, 1.0), &[]);
+    }
+
+    #[test]
+    fn a_row_has_the_bound_of_the_documentation() {
+        let bound = row_bound_px(&hints(80.0, 4.0, 1.5, 0.0, 1.0)).unwrap();
+        assert!((bound - 1.883 * 4.0 / 80.0 * 1.5f64.sqrt()).abs() < 1e-4, "{bound}");
+    }
+}

@@ -1,0 +1,16 @@
+//! What a run's log is told besides its frames and steps.
+
+/// A fact that neither a frame nor a step tells.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Note {
+    /// A setpoint was written to the robot.
+    SetpointSent,
+    /// Frames that were never looked at, because a newer one was there.
+    FramesSuperseded(u64),
+    /// Frames that the recorder could not keep up with.
+    FramesDroppedByRecorder(u64),
+    /// Events or steps that could not be recorded.
+    RecordsLost(u64),
+    /// Something that the reader of the report should know, in words.
+    Remark(String),
+}
