@@ -71,7 +71,7 @@ pub fn check_target(
     gauge: &Gauge,
 ) {
     let WidthRange { min: low, max: high } = gauge.width_range;
-    let outside = |width: &Mm| *width < low || *width > high;
+    let outside = |width: &Mm| !gauge.width_range.contains(*width);
     let report = |table: &Table<'_>, key: &'static str, width: Mm| {
         let expected = format!("within width_range_mm of [gauge], {low} to {high}");
         table.report(key, format!("{}", width.get()), expected);

@@ -152,8 +152,9 @@ fn widths(args: &CompareArgs, contenders: &[Contender]) -> anyhow::Result<Vec<Mm
         WrongArguments::new(what)
     })?;
     for who in contenders {
-        let WidthRange { min: low, max: high } = who.cell.gauge.width_range;
-        if let Some(width) = widths.iter().find(|width| **width < low || **width > high) {
+        let range = who.cell.gauge.width_range;
+        if let Some(width) = widths.iter().find(|width| !range.contains(**width)) {
+            let WidthRange { min: low, max: high } = range;
             let what = format!(
                 "--widths: found {width}, expected {low} to {high}, which is the width_range_mm of {}",
                 who.name

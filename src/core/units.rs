@@ -194,6 +194,13 @@ pub struct WidthRange {
     pub max: Mm,
 }
 
+impl WidthRange {
+    /// Whether a width lies within it, its ends included.
+    pub fn contains(&self, width: Mm) -> bool {
+        width >= self.min && width <= self.max
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
