@@ -36,12 +36,11 @@ pub fn read_control(control: &Table<'_>, target: Option<Target>) -> Option<Contr
             control.absent(key, "a number; there are no defaults for gains");
         }
     }
-    let strategy = match strategy {
-        Some(strategy) => (strategy.read)(control),
-        None => {
-            control.pass_over();
-            None
-        }
+    let strategy = if let Some(strategy) = strategy {
+        (strategy.read)(control)
+    } else {
+        control.pass_over();
+        None
     };
     let max_gap = control.number("max_gap_s", 0.01..=60.0);
     let max_hold = control.number("max_hold_s", 0.1..=3600.0);

@@ -30,7 +30,9 @@ fn list(command: &Command) -> String {
     let mut text = head("Daily commands");
     let (groups, daily): (Vec<&Command>, Vec<&Command>) =
         command.get_subcommands().partition(|one| is_group(one));
-    daily.iter().for_each(|one| text.push_str(&line("", one)));
+    for one in daily {
+        text.push_str(&line("", one));
+    }
     for group in groups {
         let about = group.get_about().map(ToString::to_string).unwrap_or_default();
         let _ = write!(text, "\n{}", head(&about));

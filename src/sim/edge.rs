@@ -13,7 +13,7 @@ use crate::numeric::normal_distribution::{cumulative, density, first_integral, s
 const SHARP_PX: f64 = 1e-6;
 /// Distance beyond which a Gaussian has ended, in standard deviations.
 const FAR: f64 = 9.0;
-/// GaugeExtent of the pixel along one direction, in units of blur, below which the
+/// Extent of the pixel along one direction, in units of blur, below which the
 /// fourth-order series is exact to 10⁻¹¹.
 const SMALL: f64 = 0.1;
 

@@ -26,7 +26,7 @@ pub fn timing(
         robot_lag: Span::from_secs(0.5 / run.robot.rate_hz) + ROBOT_LAG,
     };
     Timing::new(read.parameters, laid)
-        .map_err(|error| AssemblyError::unfit(format!("{}: {error}", found.source)).into())
+        .map_err(|error| AssemblyError::unfit(format!("{}: {error}", found.source)))
 }
 
 /// Refuses beads that would end before their extruder has come to flow and been stopped.

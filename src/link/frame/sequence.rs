@@ -16,6 +16,12 @@ pub struct Sequence {
     applied: u64,
 }
 
+impl Default for Sequence {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Sequence {
     /// Of a connection that nothing has come over.
     pub const fn new() -> Self {

@@ -19,6 +19,7 @@ const BLIND: f64 = 4.0;
 
 /// The piece of bead that a width is the mean of.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::struct_field_names, reason = "they share their unit")]
 pub struct GaugeInterval {
     /// Its middle along the path \[mm\].
     pub centre_mm: f64,

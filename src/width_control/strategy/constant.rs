@@ -12,8 +12,7 @@ use crate::width_control::controller::{
 use crate::width_control::limiter::Limits;
 
 /// A constant speed in a cell.
-pub const REGISTRATION: Registration =
-    Registration { name: "constant", needs_gains: false, read: |control| Some(read(control)?) };
+pub const REGISTRATION: Registration = Registration { name: "constant", needs_gains: false, read };
 
 /// One speed for the whole bead behind its first part.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -14,8 +14,7 @@ use crate::width_control::controller::{
 use crate::width_control::distance::{ByDistance, DistanceSettings, Distrust, MeasuredWidth};
 
 /// Control by distance in a cell.
-pub const REGISTRATION: Registration =
-    Registration { name: "distance", needs_gains: false, read: |control| Some(read(control)?) };
+pub const REGISTRATION: Registration = Registration { name: "distance", needs_gains: false, read };
 
 /// How far the flow drifts along a metre of path unless the file says so, as a
 /// fraction.

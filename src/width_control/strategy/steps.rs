@@ -13,8 +13,7 @@ use crate::width_control::limiter::Limits;
 use crate::width_control::steps::{StepSettings, Steps};
 
 /// Steps of the speed in a cell.
-pub const REGISTRATION: Registration =
-    Registration { name: "steps", needs_gains: false, read: |control| Some(read(control)?) };
+pub const REGISTRATION: Registration = Registration { name: "steps", needs_gains: false, read };
 
 /// Change of the speed in a step, as a fraction of the start speed.
 const STEP_SHARE: f64 = 0.1;
