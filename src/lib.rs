@@ -3,15 +3,15 @@
 //! ```text
 //! Frame{seq, captured_at, pixels}
 //!   → vision::Measurer::measure → Result<WidthMeasurement, Reject>
-//!   → controller::Event
-//!   → controller::Controller::step(now, Event) → Step
-//!   → ports: robot, recorder
+//!   → control::Event
+//!   → control::Controller::step(now, Event) → Step
+//!   → run::ports: robot, recorder
 //! ```
 //!
-//! Data flows one way. Everything up to [`controller`] is the core: it reads no
-//! clock, opens nothing and is given time as an argument. Devices, sockets and
-//! files live in [`io`]; [`sim`] is the simulated cell, [`offline`] works on
-//! recorded frames, [`cli`] is what a person types.
+//! Data flows one way. The core, [`control`] with what it is made of, reads no
+//! clock, opens nothing and is given time as an argument. Files live in [`io`],
+//! devices and sockets in [`drivers`]; [`sim`] is the simulated world, [`live`] the
+//! live run, [`cli`] what a person types.
 //!
 //! Conventions (pixel centres, frames of reference, signs) are in
 //! `CONVENTIONS.md`; how the modules depend on each other is in

@@ -13,6 +13,7 @@ use crate::core::units::{Mm, MmPerS, WidthRange};
 use crate::width_control::limiter::{Limit, Limits};
 use crate::width_control::pi::PiGains;
 use crate::width_control::settings::Control;
+use crate::width_control::strategy::constant::ConstantStrategy;
 use crate::width_control::strategy::pi::PiStrategy;
 use crate::width_control::target::Target;
 use std::sync::Arc;
@@ -316,4 +317,20 @@ fn a_new_bead_that_is_first_heard_in_hold_is_a_new_one() {
     let _ = line.advance(0.1, 500.0, 112.5);
     let _ = line.robot(RobotMode::Hold, 60.0, 0.0);
     assert_eq!(line.advance(0.1, 65.0, 112.5).state, State::Priming);
+}
+
+#[test]
+fn a_constant_strategy_keeps_its_speed_whatever_is_measured() {
+    let speed = MmPerS::constant(95.0);
+    let mut setup = setup();
+    setup.control.strategy = Arc::new(ConstantStrategy { speed });
+    let mut line = Line::of(setup);
+    line.now = 1.0;
+    let _ = line.robot(RobotMode::Print, 0.0, 112.5);
+    let _ = line.advance(2.0, 225.0, 112.5);
+    assert_eq!(line.width(50.0).state, State::Tracking);
+    assert_eq!(line.tick(), Some(95.0));
+    let _ = line.advance(0.2, 244.0, 95.0);
+    let _ = line.width(30.0);
+    assert_eq!(line.tick(), Some(95.0));
 }
