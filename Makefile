@@ -27,12 +27,12 @@ demo: setup ## build it and run the whole loop with nothing attached (SECONDS=20
 	$(CARGO) run --release --locked --quiet -- demo --seconds $(SECONDS) $(if $(OUT),--out "$(OUT)")
 
 test: setup lint ## format, lints, every test, and the documentation's links
-	$(CARGO) test --release --locked
+	$(CARGO) test --release --locked --workspace
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps --document-private-items
 
 lint: setup
-	$(CARGO) fmt --check
-	$(CARGO) clippy --release --locked --all-targets -- -D warnings
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
 
 doc: setup ## the library's documentation as pages
 	$(CARGO) doc --release --locked --no-deps

@@ -16,7 +16,7 @@ use crate::core::geometry::{GridSize, ImagePoint};
 ///
 /// Quads in an adaptive threshold first; where these are not found, the slower
 /// search for saddle points (Duda and Frese 2018), which sees through blur and
-/// uneven light. [`crate::calib::corner`] finds where exactly they are.
+/// uneven light. [`crate::calibration::corner`] finds where exactly they are.
 pub fn find_board(frame: &Frame, inner: GridSize) -> Result<Option<Vec<ImagePoint>>, BridgeError> {
     let GridSize { columns, rows } = inner;
     prepare();

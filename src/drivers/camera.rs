@@ -1,4 +1,4 @@
-//! Sources of frames, each behind [`crate::ports::FrameSource`].
+//! Sources of frames, each behind [`crate::run::ports::FrameSource`].
 
 pub mod folder;
 pub mod live;

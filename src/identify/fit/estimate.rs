@@ -14,7 +14,7 @@ use crate::numeric::lti::{Simulator, TransferFunction};
 /// A parameter that was estimated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
-    /// Its name, as [`Structure`] gives it; further `dead_time_s`,
+    /// Its name, as `Structure` gives it; further `dead_time_s`,
     /// `output_level`.
     pub name: String,
     /// Estimate, in seconds where the name ends so, else in units of the data and

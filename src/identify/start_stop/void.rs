@@ -6,7 +6,7 @@ use super::estimate::SeenStart;
 use super::least_squares::descend;
 use crate::numeric::number::float;
 
-/// Parameters of the delay; see [`crate::extruder::start_stop::StartStop`].
+/// Parameters of the delay; see [`crate::identify::start_stop::parameters::StartStop`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Saturating {
     pub first_flow_s: f64,

@@ -226,7 +226,7 @@ pub fn printing(text: &str, longest: usize) -> String {
     text.chars().take(longest).map(plain).collect()
 }
 
-/// A name as one word of at most [`LONGEST_NAME`] characters.
+/// A name as one word of at most `LONGEST_NAME` characters.
 pub fn one_word(name: &str, instead: &str) -> String {
     let word = printing(name, LONGEST_NAME).replace(' ', "-");
     if word.is_empty() { instead.to_owned() } else { word }
